@@ -1,30 +1,33 @@
 """One exception tree and one notice type for all of core.
 
 SagittalError
-├── InputError           the bytes, the manifest or the archive are not what was expected
-│   ├── FormatError      a file cannot be read as any (or as the declared) format
-│   ├── ManifestError    the manifest is not valid or does not fit the files
-│   └── ArchiveError     a zip breaks a limit (bomb, traversal, encryption, nesting)
-├── SignalError          the file is readable, the signals are not usable (no_rest, bad_signal, gap …)
-├── CalibrationError     the sensor-to-segment orientation cannot be found
-├── EstimationError      a filter cannot give a result it could stand behind
-└── ParameterError       an argument of ours is outside its domain
+├── InputError           invalid file contents, manifest or archive
+│   ├── FormatError      a file does not match any (or the declared) format
+│   ├── ManifestError    the manifest is invalid or does not match the files
+│   └── ArchiveError     an archive violates a limit (bomb, traversal, encryption, nesting)
+├── SignalError          the file is readable but its signals are unusable (no_rest, bad_signal, gap …)
+├── CalibrationError     the sensor-to-segment alignment cannot be estimated
+├── EstimationError      a filter cannot produce a reliable result
+└── ParameterError       an argument is outside its domain
 
-Every message says what was expected, what was found, where (sensor, seconds) and what to do.
+Every message states the expected and the actual condition, the location (sensor, seconds) and the remedy.
 `code` is stable: translations, tests and API clients rely on it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
+
+from sagittal.core.message import describe_message, read_message
 
 Severity = Literal["info", "warning", "error"]
 """error: numbers made from it would be wrong, so the analysis stops; warning: they are less certain."""
 
 
 class SagittalError(Exception):
-    """Base of all errors that are shown to a person; `code` is stable, the message is a sentence."""
+    """Base class of all errors shown to users; `code` is stable, the message is a sentence."""
 
     def __init__(
         self, code: str, message: str, *, sensor: str | None = None, t_s: float | None = None
@@ -36,36 +39,36 @@ class SagittalError(Exception):
         self.t_s = t_s
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Survive the pipe between worker and its child."""
+        """Pickle support: errors cross the pipe between a worker and its child process."""
         return _rebuild, (type(self), self.code, self.message, self.sensor, self.t_s)
 
 
 class InputError(SagittalError):
-    """The bytes, the manifest or the archive are not what was expected."""
+    """Invalid file contents, manifest or archive."""
 
 
 class FormatError(InputError):
-    """A file cannot be read as any (or as the declared) format."""
+    """A file does not match any (or the declared) format."""
 
 
 class ManifestError(InputError):
-    """The manifest is not valid or does not fit the files."""
+    """The manifest is invalid or does not match the files."""
 
 
 class ArchiveError(InputError):
-    """A zip breaks a limit: entries, size, ratio, nesting, encryption, path traversal."""
+    """An archive violates a limit: entries, size, ratio, nesting, encryption, path traversal."""
 
 
 class SignalError(SagittalError):
-    """The file is readable but its signals are not usable."""
+    """The file is readable but its signals are unusable."""
 
 
 class CalibrationError(SagittalError):
-    """The sensor-to-segment orientation cannot be found."""
+    """The sensor-to-segment alignment cannot be estimated."""
 
 
 class EstimationError(SagittalError):
-    """A filter cannot give a result it could stand behind."""
+    """A filter cannot produce a reliable result."""
 
 
 class ParameterError(SagittalError):
@@ -80,14 +83,15 @@ def _rebuild(
 
 @dataclass(frozen=True)
 class Notice:
-    """Something the reader of a result must know; travels with the result, never stops it.
+    """Information, warning or error attached to a result; it never interrupts the analysis.
 
     Parameters
     ----------
     code : stable identifier, snake_case.
-    message : one or two sentences: what was found (measured value, limit), what to do.
-    sensor : segment or device id it concerns, None for the whole recording.
-    t_s : start in seconds from recording start, None if it has no place in time.
+    message : one or two sentences: the observation (measured value, limit) and the remedy; a
+        `Message` where it has values.
+    sensor : segment or device id concerned, None for the whole recording.
+    t_s : start in seconds from recording start, None if not tied to a point in time.
     severity : info, warning or error (see `Severity`).
     """
 
@@ -98,11 +102,22 @@ class Notice:
     severity: Severity = "warning"
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for the wire."""
+        """Return a JSON-serialisable dictionary, with `template` and `values` of a `Message`."""
         return {
             "code": self.code,
-            "message": self.message,
+            **describe_message(self.message),
             "sensor": self.sensor,
             "t_s": self.t_s,
             "severity": self.severity,
         }
+
+    @classmethod
+    def from_json(cls, stored: Mapping[str, Any]) -> Notice:
+        """Read what `to_json` wrote, now or before messages had templates."""
+        return cls(
+            stored["code"],
+            read_message(stored),
+            stored["sensor"],
+            stored["t_s"],
+            stored.get("severity", "warning"),
+        )

@@ -1,7 +1,7 @@
-"""The pose estimators: the one list that pipeline, report, forms, figure and documentation read.
+"""The pose estimators: the single list used by pipeline, report, forms, avatar and documentation.
 
-An estimator makes a figure of seven segments from the sensors worn (docs/reference/estimators.md). Its names
-are written here and nowhere else in the source (tests/core/test_estimators.py).
+An estimator computes a model of seven segments from the available sensors (docs/reference/estimators.md).
+Estimator names are defined here and nowhere else in the source (tests/core/test_estimators.py).
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Segment
+from sagittal.core.message import Message
 
 Estimator = Literal["erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
 Requested = Literal["auto", "erkf", "l7s_3i", "l7s_2i", "stance_foot_anchor"]
@@ -39,31 +40,36 @@ LIVE_SINGLE_PATHS: Final = "erkf_feet_live"
 
 @dataclass(frozen=True)
 class PaperReference:
-    """Where a method comes from; doi without "https://doi.org/", empty where none was found."""
+    """Publication of a method; doi without "https://doi.org/", empty if it has none."""
 
     citation: str
     doi: str
 
     @property
     def line(self) -> str:
-        """Citation with its DOI, or that none was found."""
-        return f"{self.citation}. doi:{self.doi}" if self.doi else f"{self.citation}. No DOI found."
+        """Citation with its DOI, or a remark that there is none."""
+        return (
+            f"{self.citation}. doi:{self.doi}"
+            if self.doi
+            else Message("{citation}. No DOI found.", citation=self.citation)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseMethod:
-    """How a figure is found.
+    """How poses are estimated.
 
     Parameters
     ----------
-    method : `Poses.method` of its figure. label : of that method.
-    needs : in words, after "sensors on". sets : segments whose sensors it needs, any one of these sets.
-    sensors : all that it reads when it is asked for by name; None = every sensor there is.
-    leg_model : thighs and shanks carry no sensor, a model of the leg gives them. fixed : variables that this
-        model holds where they are, so that they are no result of a take.
-    in_room : its positions hold in the room; else the figure is for the eye alone.
-    note : what a reader of a report has to know.
-    paper : None = our own. science : the page with its equations.
+    method : `Poses.method` of the result. label : display name of the method.
+    needs : required sensors in words, completing "sensors on". sets : alternative sets of segments whose
+    sensors are required.
+    sensors : all sensors used when the method is selected by name; None = every available sensor.
+    leg_model : thighs and shanks carry no sensor; a leg model estimates them. fixed : variables held constant
+    by this model, which are therefore not results of a recording.
+    in_room : positions are valid in the world frame; otherwise the model is for visualisation only.
+    note : remark for readers of the report.
+    paper : None = developed for Sagittal. science : the page with its equations.
     """
 
     method: str
@@ -79,18 +85,18 @@ class PoseMethod:
     fixed: tuple[str, ...] = ()
 
     def runs_on(self, segments: Iterable[Segment]) -> bool:
-        """Whether sensors on these segments are enough."""
+        """Whether sensors on these segments are sufficient."""
         worn = set(segments)
         return any(needed <= worn for needed in self.sets)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseEstimator(PoseMethod):
-    """One estimator of a walk.
+    """A selectable estimator for walking.
 
     Parameters
     ----------
-    name : as it is asked for in configuration, API and command line. choice : what a form offers.
+    name : identifier in configuration, API and command line. choice : label in forms.
     """
 
     name: Estimator

@@ -48,7 +48,9 @@ THIGH: Final[dict[Side, Segment]] = {"left": "thigh_l", "right": "thigh_r"}
 
 
 class Oriented(Shape):
-    """Segments with their orientation over time: of a whole take, or what of it a finished analysis keeps."""
+    """Segments with their orientation over time: of a whole recording, or as stored with a finished
+    analysis.
+    """
 
     @property
     def t_s(self) -> Floats:
@@ -60,4 +62,4 @@ class Oriented(Shape):
 
     @property
     def valid(self) -> Mapping[Segment, Bools]:
-        """Segment → (n,) the sensor was there."""
+        """Segment → (n,) sensor data available."""

@@ -1,4 +1,4 @@
-"""Nouns and verbs that go with a count."""
+"""Wording that depends on a count."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Sagittal from Python: read a recording, analyse it, simulate one (docs/reference/python.md).
+"""Python interface of Sagittal: read, analyse and simulate recordings (docs/reference/python.md).
 
-What `__all__` lists is kept from version to version; nothing else of this distribution is promised to stay.
-Importing this package is cheap: what it needs is loaded when it is first used.
+The names in `__all__` are stable across versions; everything else in this distribution may change. Importing
+this package is cheap: dependencies are loaded on first use.
 """
 
 from __future__ import annotations

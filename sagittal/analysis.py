@@ -20,37 +20,37 @@ NUMBERS = ("mean", "sd", "cv_pct", "ci_low", "ci_high", "uncertainty", "u_own", 
 
 @dataclass(frozen=True, eq=False)
 class Analysis:
-    """What `analyse` gives; tables of what was not reached have no rows.
+    """Result of `analyse`; tables of stages that were not reached are empty.
 
-    Tables are pyarrow tables; `table.to_pandas()` makes a data frame of one, `table["x"].to_numpy()` an array
-    of a column. Undefined is null.
+    Tables are pyarrow tables; `table.to_pandas()` returns a data frame, `table["x"].to_numpy()` a column as
+    an array. Undefined values are null.
     """
 
     _found: pipeline.TakeAnalysis
 
     @property
     def problem(self) -> Notice | None:
-        """What stopped the chain: code, sentence, sensor, time; None when every stage ran."""
+        """Error that stopped the pipeline: code, message, sensor, time; None if every stage ran."""
         return self._found.problem
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Everything the stages have to say of the take, in order of the chain."""
+        """Notices of all stages, in pipeline order."""
         return self._found.notices
 
     @property
     def quality(self) -> str:
-        """Level of the signals: "good", "usable" or "poor"."""
+        """Quality level of the signals: "good", "usable" or "poor"."""
         return self._found.quality.level
 
     @property
     def estimator(self) -> str | None:
-        """Method of the pose estimator that ran (docs/reference/estimators.md); None when none did."""
+        """Method of the pose estimator used (docs/reference/estimators.md); None if none ran."""
         return None if self._found.poses is None else self._found.poses.method
 
     @property
     def provenance(self) -> Mapping[str, object]:
-        """sha256 of every input file, digest of all parameters."""
+        """SHA-256 of every input file and digest of all parameters."""
         return self._found.provenance
 
     @property
@@ -106,7 +106,7 @@ class Analysis:
         )
 
     def parameter(self, name: str, side: Side | None = None) -> float:
-        """Mean of one parameter, NaN where it is not defined; raises KeyError when there is none so named."""
+        """Mean of one parameter, NaN if undefined; raises KeyError for an unknown name."""
         for p in self._found.parameters:
             if (p.name, p.side) == (name, side):
                 return nan if p.mean is None else p.mean

@@ -26,17 +26,16 @@ from sagittal.simulated import SimulatedWalk
 
 
 def read(*paths: str | Path, manifest: Mapping[str, Any] | str | Path | None = None) -> Recording:
-    """Read files, folders or zips of one take.
+    """Read files, folders or zip archives of one recording.
 
     Parameters
     ----------
-    manifest : which sensor sits where, units, body height (docs/reference/formats.md): a mapping, or the path
-        of a JSON file; None where the files say it themselves.
+    manifest : sensor placement, units, body height (docs/reference/formats.md): a mapping, or the path of a
+    JSON file; None if the files contain this information.
 
     Raises
     ------
-    SagittalError
-        `file_not_found`, or the files or the manifest are not what was expected; the message says why.
+    SagittalError `file_not_found`, or the files or the manifest are invalid; the message states the reason.
     """
     declared = None
     if isinstance(manifest, Mapping):
@@ -53,23 +52,22 @@ def analyse(
     manifest: Mapping[str, Any] | str | Path | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> Analysis:
-    """Run the whole chain on one take.
+    """Run the complete pipeline on one recording.
 
     Parameters
     ----------
-    recording : of `read` or `simulate`, or a path that is read first, with `manifest`.
-    config : parameters of the stages that differ from the defaults, as the API takes them:
+    recording : from `read` or `simulate`, or a path to be read with `manifest`.
+    config : stage parameters that differ from the defaults, in the form used by the API:
         `{"poses": {"least_valid": 0.7}}`.
-    progress : called with the stage that starts and the share of the work done before it, 0 to 1.
+    progress : called at the start of each stage with its name and the fraction of work completed, 0 to 1.
 
     Returns
     -------
-    Analysis; when a stage could not go on its `problem` says why and what was reached is there.
+    Analysis; if a stage failed, `problem` holds the reason and earlier results are available.
 
     Raises
     ------
-    SagittalError
-        No common time axis can be made, or a parameter is unknown.
+    SagittalError No common time axis can be constructed, or a parameter is unknown.
     """
     if not isinstance(recording, Recording):
         recording = read(recording, manifest=manifest)
@@ -85,12 +83,12 @@ def simulate(
     rate_hz: float = 100.0,
     segments: Sequence[Segment] | None = None,
 ) -> SimulatedWalk:
-    """A simulated walk with its exact truth; the same arguments give the same bits.
+    """Simulate a walk with exact ground truth; equal arguments give bit-identical results.
 
     Parameters
     ----------
     script : name of a scenario (docs/science/simulation.md).
-    segments : that carry a sensor; None = as the scenario says, mostly all seven.
+    segments : segments with a sensor; None = as defined by the scenario, usually all seven.
     """
     worn = None if segments is None else tuple(segments)
     return SimulatedWalk(simulate_scenario(script, seed, height_m, rate_hz, worn))

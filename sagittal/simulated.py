@@ -1,4 +1,4 @@
-"""A simulated take and its truth as tables."""
+"""A simulated recording and its ground truth as tables."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from sagittal.core.simulate import Simulation, angle_table, event_table, stride_
 
 @dataclass(frozen=True, eq=False)
 class SimulatedWalk:
-    """What `simulate` gives: the recording, and what really happened."""
+    """Result of `simulate`: the recording and its ground truth."""
 
     _simulation: Simulation
 
     @property
     def recording(self) -> Recording:
-        """What the sensors measured; `analyse` takes it."""
+        """The simulated sensor recording, as input for `analyse`."""
         return self._simulation.recording
 
     @property
     def angles(self) -> pa.Table:
-        """`t_s`, and per joint angle `<name>_deg`, zero = the posture of standing."""
+        """`t_s` and every joint angle as `<name>_deg`, relative to the standing posture."""
         found = angle_table(self._simulation.truth)
         return pa.table({"t_s": found.pop("t_s"), **{f"{k}_deg": np.degrees(v) for k, v in found.items()}})
 

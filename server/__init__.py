@@ -1,1 +1,1 @@
-"""Everything with effects: HTTP, database, files, jobs, 3D views, command line."""
+"""Everything with side effects: HTTP, database, files, jobs, 3D views and command line."""

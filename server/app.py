@@ -1,4 +1,4 @@
-"""Wires the web process together; nothing is computed here."""
+"""Assembles the web application; contains no other logic."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """Return the application of one installation; its lifespan opens and closes what it needs.
+    """Return the application of one installation; its lifespan opens and closes its resources.
 
     Raises
     ------
     UndeclaredRouteError
         a route declares no action.
     UnknownViserError
-        the installed viser lacks what the 3D views need.
+        the installed viser is incompatible with the 3D views.
     """
     # the web stack and its routes take seconds to import: only who builds an application waits for them
     from fastapi import FastAPI
@@ -73,7 +73,7 @@ def create_app(settings: Settings) -> FastAPI:
 
 @asynccontextmanager
 async def _run(app: FastAPI) -> AsyncIterator[None]:
-    """Open what the application needs while the block runs."""
+    """Open the resources of the application for the duration of the context."""
     from sagittal.server.lifespan import run_installation
     from sagittal.server.viewer.proxy import open_views
 
@@ -83,9 +83,9 @@ async def _run(app: FastAPI) -> AsyncIterator[None]:
 
 @cache
 def wire_routes() -> tuple[BaseRoute, ...]:
-    """Return the routes of every application, checked; nothing in them belongs to one installation.
+    """Return the checked routes shared by all applications; they hold no state of an installation.
 
-    A router of FastAPI's may have a lifespan; here it would be lost: what is opened is opened by `_run`.
+    Lifespans of FastAPI routers would be ignored here; resources are opened by `_run`.
 
     Raises
     ------

@@ -1,12 +1,12 @@
-"""The audit trail: append-only rows sealed with the hash of the one before, in the change's own transaction.
+"""Audit trail: append-only rows chained by hash, written in the transaction of the change.
 
     with db.write() as c:
         c.execute(...)
         audit.record(c, actor, "patient.renamed", "patient", pid, {"fields": ["code"]})
 
-Rows of what is only looked at go through server/trail.py. One row per opened or changed resource; never a
-patient's code or name in `detail` (it outlives an erasure).
-Triggers forbid UPDATE and DELETE; who gets around them breaks the chain, which `sagittal check` sees.
+Rows for read access go through server/trail.py. One row per opened or changed resource; `detail` never
+contains a patient's code or name, as it outlives an erasure. Triggers forbid UPDATE and DELETE; bypassing
+them breaks the chain, which `sagittal check` detects.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ GENESIS = "0" * 64
 
 
 class Actor(Protocol):
-    """Who does something: a signed-in person."""
+    """A signed-in user who performs an action."""
 
     @property
     def user_id(self) -> str:
-        """Row of `user`."""
+        """Primary key in `user`."""
 
     @property
     def name(self) -> str:
@@ -46,14 +46,14 @@ def record(
     resource_id: str | None,
     detail: Mapping[str, Any] | None = None,
     *,
-    at: dt.datetime | None = None,
+    time: dt.datetime | None = None,
 ) -> None:
-    """Append one row; the connection must be a writing one, actor None = the system itself, at None = now."""
+    """Append one row on a writing connection; actor None = the system, at None = now."""
     token = getattr(actor, "token_id", None)  # who asks by an API token (server/auth/identity.py)
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
         "seq": 1 if last is None else last.seq + 1,
-        "at": at or now(),
+        "at": time or now(),
         "user_id": actor.user_id if actor else None,
         "user_name": actor.name if actor else None,
         "action": action,
@@ -65,35 +65,35 @@ def record(
     c.execute(insert(audit).values(**row, hash=_seal(row)))
 
 
-def list_entries(c: Connection, *, before: int | None = None, limit: int = 100) -> list[Row[Any]]:
+def list_entries(c: Connection, *, before_seq: int | None = None, limit: int = 100) -> list[Row[Any]]:
     """The newest rows, or the newest before a sequence number (for paging)."""
     query = select(audit).order_by(audit.c.seq.desc()).limit(limit)
-    return list(c.execute(query if before is None else query.where(audit.c.seq < before)))
+    return list(c.execute(query if before_seq is None else query.where(audit.c.seq < before_seq)))
 
 
 def find_problems(c: Connection) -> list[str]:
-    """Where the chain is broken: changed rows, removed rows, a cut-off beginning or end.
+    """Breaks in the chain: changed or removed rows, or a truncated beginning or end.
 
-    A whole database that is older than the one before is not seen here but in storage/high_water.py.
+    A database replaced as a whole by an older copy is detected by storage/high_water.py instead.
     """
-    found = []
+    problems = []
     expected, previous = 1, GENESIS
     for row in c.execute(select(audit).order_by(audit.c.seq)):
         if row.seq != expected:
-            found.append(f"audit rows {expected} to {row.seq - 1} have been removed")
+            problems.append(f"audit rows {expected} to {row.seq - 1} have been removed")
         elif row.previous != previous:
-            found.append(f"audit row {row.seq} does not follow the row before it")
+            problems.append(f"audit row {row.seq} does not follow the row before it")
         if _seal(row._asdict()) != row.hash:
-            found.append(f"audit row {row.seq} has been changed")
+            problems.append(f"audit row {row.seq} has been changed")
         expected, previous = row.seq + 1, row.hash
     highest = highest_number(c, audit.name)
     if highest >= expected:
-        found.append(f"audit rows {expected} to {highest}, the newest, have been removed")
-    return found
+        problems.append(f"audit rows {expected} to {highest}, the newest, have been removed")
+    return problems
 
 
 def _seal(row: Mapping[str, Any]) -> str:
-    """sha256 over every column but the hash itself, as canonical JSON."""
+    """SHA-256 over every column except the hash, as canonical JSON."""
     content = {k: v.astimezone(dt.UTC).isoformat() if k == "at" else v for k, v in row.items() if k != "hash"}
     text = json.dumps(content, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,7 +1,7 @@
-"""What endpoints take from the running application, as typed dependencies.
+"""Typed dependencies through which endpoints access the running application.
 
-The dependencies are asynchronous: for each that is not, FastAPI takes a thread, and on a busy machine a page
-waits for all of them in turn.
+The dependencies are asynchronous: FastAPI runs each synchronous one in a thread, and on a busy machine a page
+would wait for all of them in turn.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from sagittal.server.trail import AuditTrail
 
 
 class State(datastructures.State):
-    """What the web process has open, as `app.state`: given by `create_app`, filled by the lifespan.
+    """Open resources of the web process (`app.state`), set by `create_app` and the lifespan.
 
-    Rooms below this one take single parts of it from `app.state` and say their type themselves.
+    Lower-level packages read single attributes of `app.state` and declare their types themselves.
     """
 
     settings: Settings
@@ -58,12 +58,12 @@ class State(datastructures.State):
 
 
 def state_of(connection: HTTPConnection) -> State:
-    """Return what the application of a request has open."""
+    """Return the state of the application that serves a request."""
     return cast("State", connection.app.state)
 
 
 def _part(choose: Callable[[State], object]) -> Any:
-    """A dependency that takes one part of the state."""
+    """Dependency that returns one attribute of the state."""
 
     async def take(connection: HTTPConnection) -> object:
         return choose(state_of(connection))
@@ -111,5 +111,5 @@ StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]
 
 
 def address_of(connection: HTTPConnection) -> str:
-    """Return the caller's address; behind a proxy uvicorn has already put the forwarded one there."""
+    """Return the client's address; uvicorn has already resolved forwarded addresses of proxies."""
     return connection.client.host if connection.client else "unknown"

@@ -1,8 +1,7 @@
-"""What a use case may refuse, beside the errors of core; `status` is the HTTP status that says the same.
+"""Errors of use cases, in addition to those of core; `status` is the corresponding HTTP status.
 
-403 not_yours
-404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large, set_too_large,
-too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 507 disk_full
+403 not_yours 404 not_found · 409 code_taken, name_taken, no_files, not_confirmed · 413 file_too_large,
+set_too_large, too_many_files · 422 bad_value · 503 node_away, blob_damaged, blob_missing · 507 disk_full
 """
 
 from __future__ import annotations
@@ -11,28 +10,28 @@ from sagittal.core.errors import SagittalError
 
 
 class ServiceError(SagittalError):
-    """A use case cannot be carried out as asked."""
+    """A use case cannot be carried out as requested."""
 
     status = 422
 
 
 class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
-    """The thing asked for does not exist (or has been deleted)."""
+    """The requested resource does not exist or has been deleted."""
 
     status = 404
 
-    def __init__(self, what: str, identity: str) -> None:
-        super().__init__("not_found", f"There is no {what} '{identity}', or it has been deleted.")
+    def __init__(self, kind: str, identity: str) -> None:
+        super().__init__("not_found", f"There is no {kind} '{identity}', or it has been deleted.")
 
 
 class NotAllowed(ServiceError):  # noqa: N818 - the name of the HTTP status
-    """The role allows it, but not of this one."""
+    """The role permits the action, but not on this resource."""
 
     status = 403
 
 
 class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status
-    """The present state does not allow it; the message says what to do first."""
+    """The current state does not allow the action; the message explains what to do first."""
 
     status = 409
 
@@ -42,7 +41,7 @@ NODE_AWAY = "node_away"
 
 
 class NodeAway(ServiceError):  # noqa: N818 - what the person reads
-    """The web server that has a live take is away."""
+    """The web server that runs a live trial is unavailable."""
 
     status = 503
 

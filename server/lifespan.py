@@ -1,4 +1,4 @@
-"""What the web process opens when it starts and closes when it ends."""
+"""Resources that the web process opens at start and closes at the end."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ log = logging.getLogger(__name__)
 
 
 def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
-    """Finish erasures that were interrupted, and say aloud when this database is not to be trusted."""
+    """Finish interrupted erasures and log a warning if this database cannot be trusted."""
     erasure.finish(db, blobs, settings)
     with db.read() as c:
         doubted = custody.find_doubt(c, settings)
@@ -55,12 +55,12 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
 
 
 def _end_at_once() -> None:
-    """End without a word more to the disk: another process has this one's files."""
+    """Exit immediately without writing to disk: another process owns the files of this one."""
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def _say_workers(state: State) -> str:
-    """Whether the worker processes that `sagittal serve` started live; others tell nobody."""
+    """Status of the worker processes started by `sagittal serve`; other workers are not monitored."""
     workers: Workers | None = getattr(state, "workers", None)
     if workers is None or workers.healthy:
         return "ok"
@@ -68,15 +68,15 @@ def _say_workers(state: State) -> str:
 
 
 def _say_estimators(state: State) -> str:
-    living, wanted = len(state.hub.pool.pids), state.settings.live_workers
-    if living >= wanted:
+    living, configured = len(state.hub.pool.pids), state.settings.live_workers
+    if living >= configured:
         return "ok"
-    return f"{living} of {wanted} estimator processes run; see the server's log."
+    return f"{living} of {configured} estimator processes run; see the server's log."
 
 
 @contextlib.asynccontextmanager
 async def run_installation(app: FastAPI) -> AsyncIterator[None]:
-    """Open database, files, queue and live takes of `app.state.settings` while the block runs."""
+    """Open database, files, queue and live trials of `app.state.settings` for the duration of the context."""
     state = cast("State", app.state)
     settings = state.settings
     refuse_strangers(settings)

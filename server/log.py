@@ -1,7 +1,7 @@
-"""The log on standard error: lines for people, or one JSON object a line (SAGITTAL_LOG_FORMAT=json).
+"""Logging to standard error: text, or one JSON object per line (SAGITTAL_LOG_FORMAT=json).
 
-Inside a request every line carries its id (`X-Request-ID` of the answer). Logs name rows by their ids, never
-a patient.
+Lines logged within a request carry its id (`X-Request-ID` of the response). Logs refer to rows by id, never
+to patients by name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asc
 
 
 def start_log(settings: Settings, handler: logging.Handler | None = None) -> None:
-    """Log to stderr in the format of the settings: what we do, and what goes wrong in some libraries."""
+    """Log to stderr in the configured format: our own messages, and warnings of some libraries."""
     handler = handler or logging.StreamHandler()
     handler.addFilter(_add_request_id)
     handler.setFormatter(JsonLines() if settings.log_format == "json" else _Lines())
@@ -33,20 +33,20 @@ def start_log(settings: Settings, handler: logging.Handler | None = None) -> Non
 
 
 class JsonLines(logging.Formatter):
-    """One object a line: time, level, logger, message, request_id, error, and what a call gave as `extra`."""
+    """One object per line: time, level, logger, message, request_id, error and the `extra` of the call."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """The record as JSON."""
-        at = dt.datetime.fromtimestamp(record.created, dt.UTC)
+        """Return the record as JSON."""
+        time = dt.datetime.fromtimestamp(record.created, dt.UTC)
         line: dict[str, object] = {
-            "time": at.isoformat(timespec="milliseconds"),
+            "time": time.isoformat(timespec="milliseconds"),
             "level": record.levelname.lower(),
             "logger": record.name,
             "message": record.getMessage(),
         }
-        asked = getattr(record, "request_id", None)
-        if asked is not None:
-            line["request_id"] = asked
+        current_id = getattr(record, "request_id", None)
+        if current_id is not None:
+            line["request_id"] = current_id
         if record.exc_info:
             line["error"] = self.formatException(record.exc_info)
         line |= {name: value for name, value in vars(record).items() if name not in _STANDARD}
@@ -54,15 +54,15 @@ class JsonLines(logging.Formatter):
 
 
 class _Lines(logging.Formatter):
-    """Lines for people; the request's id stands at the end."""
+    """Plain-text lines that end with the request id."""
 
     def __init__(self) -> None:
         super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
         line = super().formatMessage(record)
-        asked = getattr(record, "request_id", None)
-        return line if asked is None else f"{line} [{asked}]"
+        current_id = getattr(record, "request_id", None)
+        return line if current_id is None else f"{line} [{current_id}]"
 
 
 def _add_request_id(record: logging.LogRecord) -> bool:

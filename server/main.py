@@ -1,7 +1,7 @@
-"""The console script `sagittal`: a command is a function of server/commands, its signature what it takes.
+"""The console script `sagittal`: one function in server/commands per command, its signature the options.
 
-Exit codes: 0 = done (analyse: at least one parameter), 1 = not possible (analyse: nothing analysable), 2 =
-the call's words are off.
+Exit codes: 0 = success (analyse: at least one parameter), 1 = failure (analyse: nothing analysable), 2 =
+invalid arguments.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         if not words:
             raise CycloptsError(msg="A command is missing.")
-        run, given, _ = make_app().parse_args(words, print_error=False, exit_on_error=False)
+        run, bound, _ = make_app().parse_args(words, print_error=False, exit_on_error=False)
     except CycloptsError as error:
         command = f"{words[0]} " if words and words[0] in COMMANDS else ""
         sys.stderr.write(
@@ -65,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         return 2
     if words[0] not in COMMANDS or run.__module__.startswith("cyclopts"):
-        run(*given.args, **given.kwargs)  # help or version
+        run(*bound.args, **bound.kwargs)  # help or version
         return 0
     from sagittal.core.errors import SagittalError
     from sagittal.server.settings import SettingsError, load_settings
@@ -73,8 +73,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     try:
         # before numba, which no command loads before it runs
-        share_compile_cache(load_settings({"data_dir": given.arguments.get("data_dir")}).cache)
-        return int(run(*given.args, **given.kwargs))
+        share_compile_cache(load_settings({"data_dir": bound.arguments.get("data_dir")}).cache)
+        return int(run(*bound.args, **bound.kwargs))
     except SettingsError as error:
         sys.stderr.write(f"{error}\n")
         return 2
@@ -92,7 +92,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def make_app() -> App:
-    """The commands, each loaded when it is called: numba and the web stack take seconds to import."""
+    """Command-line application; each command is imported when called, as numba and the web stack load
+    slowly.
+    """
     app = App(
         name="sagittal",
         help="Gait analysis from body-worn IMUs. Not a medical device.",
@@ -108,7 +110,7 @@ def make_app() -> App:
 
 
 def find_module(command: str) -> str:
-    """Name of the module of a command, whose function has the module's name."""
+    """Name of the module of a command, whose function has the same name."""
     room = "commands.science" if command in SCIENCE else "commands"
     return f"sagittal.server.{room}.{command.replace('-', '_')}"
 

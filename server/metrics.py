@@ -1,6 +1,6 @@
-"""Figures for Prometheus: what is counted as it happens, and what is looked up when somebody asks.
+"""Prometheus metrics: request counters, and state collected at scrape time.
 
-No figure names a person, a patient or an address; routes are patterns.
+No metric identifies a person, a patient or an address; routes are patterns.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ OTHER_METHOD: Final = "other"
 
 
 class RequestMetrics:
-    """Requests since the start; one for each application, which has a registry of its own."""
+    """Request metrics since start, with a separate registry for each application."""
 
     def __init__(self) -> None:
         self.registry = CollectorRegistry()
@@ -50,21 +50,21 @@ class RequestMetrics:
         )
 
     def observe(self, method: str, route: str, status: int, took_s: float) -> None:
-        """Count one request; methods that nobody serves are one, so that no stranger makes figures up."""
+        """Count one request; unknown methods share one label, so that clients cannot create series."""
         self._count.labels(method if method in METHODS else OTHER_METHOD, route, str(status)).inc()
         self._time.labels(route).observe(took_s)
 
     def render(self) -> bytes:
-        """Everything in the text format of Prometheus 0.0.4."""
+        """All metrics in the Prometheus text format 0.0.4."""
         return generate_latest(self.registry)
 
 
 class StateCollector(Collector):
-    """What is looked up at every question: jobs, live takes, parts, disk, backups, audit log.
+    """Metrics collected at each scrape: jobs, live trials, components, disk, backups and audit log.
 
     Parameters
     ----------
-    checks : parts of the installation, each "ok" or what does not work. nodes : the web servers.
+    checks : components of the installation, each "ok" or a description of the fault. nodes : the web servers.
     """
 
     def __init__(
@@ -73,10 +73,10 @@ class StateCollector(Collector):
         self._settings, self._db, self._checks, self._nodes = settings, db, checks, nodes
 
     def collect(self) -> Iterator[Metric]:
-        """The figures of this moment."""
+        """Current metrics."""
         with self._db.read() as c:
-            counted = c.execute(select(job.c.state, func.count()).group_by(job.c.state)).all()
-            jobs = dict.fromkeys(JOB_STATES, 0) | {row[0]: row[1] for row in counted}
+            counts = c.execute(select(job.c.state, func.count()).group_by(job.c.state)).all()
+            jobs = dict.fromkeys(JOB_STATES, 0) | {row[0]: row[1] for row in counts}
             oldest = c.execute(select(func.min(job.c.created_at)).where(job.c.state == "queued")).scalar()
             is_open = live_take.c.state.in_(OPEN_TAKE_STATES)
             takes = c.execute(select(func.count()).where(is_open)).scalar_one()
@@ -94,8 +94,8 @@ class StateCollector(Collector):
         free = shutil.disk_usage(self._settings.data_dir).free
         yield _gauge("sagittal_disk_free_bytes", "Free space of the data folder", free)
         family = GaugeMetricFamily("sagittal_part_up", "1 = this part works", labels=("part",))
-        for part, said in self._checks().items():
-            family.add_metric((part,), float(said == "ok"))
+        for part, status in self._checks().items():
+            family.add_metric((part,), float(status == "ok"))
         yield family
         if self._nodes.is_one_of_several:
             family = GaugeMetricFamily("sagittal_node_up", "1 = this one is heard of", labels=("node",))

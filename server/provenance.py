@@ -1,4 +1,4 @@
-"""Which version of the code makes the numbers."""
+"""Version of the code that computed the results."""
 
 from typing import Final
 

@@ -1,12 +1,12 @@
-"""Everything an operator may set, read once at start from the command line and the environment, then frozen.
+"""Settings of an installation, read once at start from the command line and the environment, then immutable.
 
 Every field `some_name` has the environment variable `SAGITTAL_SOME_NAME` (data_dir: `SAGITTAL_HOME`); the
-command line goes before the environment, the environment before the defaults below:
+command line takes precedence over the environment, and the environment over the defaults below:
 
-    settings = load_settings({"port": 8080})        # what the command line gave; None = not given
+    settings = load_settings({"port": 8080})        # from the command line; None = not given
 
-By hand, because every process reads them: importing this module takes 0.04 s of a processor,
-pydantic-settings 0.19, and only the sixty lines that read and name values would go.
+Implemented without pydantic-settings because every process loads them: importing this module takes 0.04 s of
+CPU time instead of 0.19 s, and the library would replace only sixty lines.
 """
 
 from __future__ import annotations
@@ -31,47 +31,46 @@ PROXY_DOMAIN = "addresses or networks of proxies, such as 172.16.0.0/12, and not
 
 
 class SettingsError(ValueError):
-    """A setting is outside its domain; the message names it, what was given and what is possible."""
+    """A setting is outside its domain; the message names the setting, its value and the valid range."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """One installation.
+    """Settings of one installation.
 
     Parameters
     ----------
-    data_dir : folder of database, blobs and caches; made at first start, readable by its owner only.
+    data_dir : folder of database, blobs and caches; created at first start, readable by its owner only.
     host, port : address the web server listens on.
-    allowed_hosts : names a request may carry in `Host` besides loopback (a name that was rebound to our
-        address is refused).
-    behind_tls : a reverse proxy speaks HTTPS for us: cookies are `Secure`, any address may be bound.
-    trusted_proxies : addresses and networks whose X-Forwarded-For and -Proto are believed, so that throttles
-        count clients and not the proxy; behind TLS loopback is always one of them.
-    max_connections : connections at once, at most what the system's limit of open files has room for.
+    allowed_hosts : host names accepted in `Host` besides loopback (protects against DNS rebinding).
+    behind_tls : a reverse proxy terminates TLS: cookies are `Secure`, any address may be bound.
+    trusted_proxies : addresses and networks whose X-Forwarded-For and -Proto are trusted, so that throttles
+        count clients and not the proxy; with `behind_tls`, loopback is always trusted.
+    max_connections : simultaneous connections, bounded by the system's limit on open files.
     max_file_bytes, max_set_bytes, max_files : limits of one upload and of one recording's upload set.
-    min_free_bytes : uploads are refused below this free disk space.
-    workers : worker processes started by `sagittal serve`; each keeps one warm child.
-    live_workers : processes that estimate live takes; each carries many, 0 = takes are recorded only.
-    lease_s : a worker that has not renewed its job for so long is taken for dead; renewed every third of it.
-    job_timeout_s : longest run of one job, or of the part of it since its last checkpoint.
+    min_free_bytes : free disk space below which uploads are rejected.
+    workers : worker processes started by `sagittal serve`; each has one pre-warmed child.
+    live_workers : processes that analyse live trials, many each; 0 = trials are recorded only.
+    lease_s : time without renewal after which a worker is considered dead; renewed every third of it.
+    job_timeout_s : maximum run time of a job, or of the part since its last checkpoint.
     child_memory_bytes : address space of the computing child (RLIMIT_AS; libraries alone map 1 GB), 0 = none.
-    sweep_grace_s : age from which a file that nothing refers to goes to the trash.
-    idle_minutes, absolute_hours : life of a sign-in.
-    backup_dir : folder outside the data folder in which `sagittal serve` keeps backups, "" = it makes none.
-    backup_at : when, HH:MM in the machine's own time.
+    sweep_grace_s : age after which an unreferenced file is moved to the trash.
+    idle_minutes, absolute_hours : lifetime of a sign-in, idle and total.
+    backup_dir : folder outside the data folder for the backups of `sagittal serve`, "" = no backups.
+    backup_at : time of the daily backup, HH:MM in local time.
     backup_key : file with the key that encrypts them (`sagittal keygen`), "" = they are not encrypted.
     identity_key : file with the key that encrypts patients' names (`sagittal identity-key`), "" = in data_dir
-    retention_years : patients without a visit for longer are listed on the page System, 0 = none are.
-    log_format : "text" for people or "json", one object a line with a line for each request.
+    retention_years : patients without a visit for longer are listed on the System page, 0 = off.
+    log_format : "text" or "json", one object per line including one for each request.
     database_url : a PostgreSQL database instead of the file in the data folder, as
-        postgresql://user:password@host:port/database; what it leaves out, such as the password, comes from
-        where PostgreSQL's own programs have it (PGPASSFILE). "" = the file.
-    bucket : where stored files are instead of in the data folder: s3://name or s3://name/prefix, of any store
-        that speaks S3. Endpoint, region and keys come from the variables that all its programs know
-        (AWS_ENDPOINT_URL, AWS_REGION, AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY). "" = the folder.
-    node_name, node_address : of this web server where several serve one PostgreSQL database: the name is for
-        good and names its folder, the address is where the others reach it. "" = it serves alone.
-    task_modules : modules whose import registers kinds of jobs, and what they draw.
+        postgresql://user:password@host:port/database; omitted parts, such as the password, are taken from
+        libpq's usual sources (PGPASSFILE). "" = the file.
+    bucket : S3-compatible object store used instead of the data folder: s3://name or s3://name/prefix.
+        Endpoint, region and keys come from the standard variables (AWS_ENDPOINT_URL, AWS_REGION,
+        AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY). "" = the folder.
+    node_name, node_address : of this web server if several share one PostgreSQL database: the name is
+        permanent and names its folder; the others reach it at the address. "" = single server.
+    task_modules : modules whose import registers kinds of jobs and their displays.
     """
 
     data_dir: Path = field(default_factory=lambda: Path.home() / ".sagittal")
@@ -156,7 +155,7 @@ class Settings:
             )
 
     def require_private_traffic(self) -> None:
-        """Raise SettingsError if the web server would listen on a network without TLS in front of it."""
+        """Raise SettingsError if the web server would listen on a network without TLS."""
         if self.host not in LOOPBACK and not self.behind_tls:
             raise SettingsError(
                 f"host is '{self.host}': patients' data would cross the network unencrypted. Put a TLS proxy "
@@ -164,7 +163,7 @@ class Settings:
             )
 
     def make_public_address(self, port: int) -> str:
-        """Return the address at which a browser reaches the web server that listens on a port.
+        """Return the URL at which a browser reaches the web server on a port.
 
         Behind TLS it is the first allowed host. An unspecified host (0.0.0.0, ::) is reached as localhost.
         """
@@ -180,12 +179,12 @@ class Settings:
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """Every host name a request may carry."""
+        """All accepted host names."""
         return (*LOOPBACK, *self.allowed_hosts)
 
     @property
     def proxies(self) -> tuple[str, ...]:
-        """Every proxy that is believed."""
+        """All trusted proxies."""
         return ("127.0.0.1", "::1", *self.trusted_proxies) if self.behind_tls else self.trusted_proxies
 
     @property
@@ -195,52 +194,52 @@ class Settings:
 
     @property
     def database_source(self) -> Path | str:
-        """Where the database is: the SQLite file, or the URL of PostgreSQL."""
+        """Location of the database: the SQLite file or the URL of PostgreSQL."""
         return self.database_url or self.database
 
     @property
     def blobs(self) -> Path:
-        """Folder of the content-addressed files, and of those that are on their way into a bucket."""
+        """Folder of the content-addressed files, including those awaiting upload to a bucket."""
         return self.data_dir / "blobs"
 
     @property
     def nodes(self) -> Path:
-        """Folder with one of each web server that has a name, and the key by which they know each other."""
+        """Folder with a subfolder for each named web server, and their shared key."""
         return self.data_dir / "nodes"
 
     @property
     def node_folder(self) -> Path:
-        """Where this web server has what no other one may write."""
+        """Folder that only this web server writes."""
         return self.nodes / self.node_name if self.node_name else self.data_dir
 
     @property
     def node_key(self) -> Path:
-        """The key by which web servers know each other (server/nodes/passage.py)."""
+        """Key with which web servers authenticate each other (server/nodes/passage.py)."""
         return self.nodes / "key"
 
     @property
     def live(self) -> Path:
-        """Folder of this web server's logs of live takes that have not become recordings yet."""
+        """Folder of this web server's logs of live trials that have not become recordings yet."""
         return self.node_folder / "live"
 
     @property
     def live_folders(self) -> list[Path]:
-        """The same of all web servers; some may not be there."""
+        """Live-trial folders of all web servers; some may not exist."""
         return [self.data_dir / "live", *sorted(self.nodes.glob("*/live"))]
 
     @property
     def trash(self) -> Path:
-        """Folder of stored files that nothing refers to any more (storage/trash.py)."""
+        """Folder of unreferenced stored files (storage/trash.py)."""
         return self.data_dir / "trash"
 
     @property
     def erasing(self) -> Path:
-        """Folder of notes about erasures under way, so that an interrupted one is finished."""
+        """Folder of records of erasures in progress, so that interrupted ones are finished."""
         return self.data_dir / "erasing"
 
     @property
     def mark(self) -> Path:
-        """The file that says how far the audit log has ever come (storage/high_water.py)."""
+        """File with the last sequence number of the audit log (storage/high_water.py)."""
         return self.data_dir / "audit.mark"
 
     @property
@@ -250,51 +249,53 @@ class Settings:
 
     @property
     def backups(self) -> Path:
-        """Folder of database copies made before upgrades, and of what a backup needs while it is made."""
+        """Folder of database copies made before upgrades, and of temporary files of a backup."""
         return self.data_dir / "backups"
 
     @property
     def backup_state(self) -> Path:
-        """The file that says how the last backup and the last restore test went."""
+        """File with the outcome of the last backup and the last restore test."""
         return self.data_dir / "backup.json"
 
     @property
     def restoring(self) -> Path:
-        """Folder in which a restore keeps everything until all of it has been checked."""
+        """Folder in which a restore is staged until it has been verified."""
         return self.data_dir / "restoring"
 
     @property
     def second_factor_key(self) -> Path:
-        """The key that opens the secrets of second factors (server/auth/second_factor.py)."""
+        """Key that decrypts the secrets of second factors (server/auth/second_factor.py)."""
         return self.data_dir / "second-factor.key"
 
     @property
     def identity_key_file(self) -> Path:
-        """The key that opens names and addresses of patients (storage/field_cipher.py)."""
+        """Key that decrypts names and addresses of patients (storage/field_cipher.py)."""
         return Path(self.identity_key) if self.identity_key else self.data_dir / "identity.key"
 
     @property
     def lock(self) -> Path:
-        """The file whose lock says that a server is running on this data folder; several share it."""
+        """Lock file of a running server on this data folder, held as a shared lock."""
         return self.data_dir / "server.lock"
 
     @property
     def node_lock(self) -> Path:
-        """The same of what one among several web servers has for itself."""
+        """Lock file held exclusively by one of several web servers."""
         return self.node_folder / "server.lock"
 
     @property
     def workers_lock(self) -> Path:
-        """The file whose lock all workers of this data folder share; who moves its content has it alone."""
+        """Lock file shared by all workers of this data folder; held exclusively while its content is
+        moved.
+        """
         return self.data_dir / "workers.lock"
 
     def environment(self) -> dict[str, str]:
-        """These settings as environment variables, for a process started by us."""
+        """These settings as environment variables for child processes."""
         return {_variable(f.name): _text(getattr(self, f.name)) for f in dataclasses.fields(self)}
 
 
 def load_settings(
-    given: Mapping[str, object] | None = None, environment: Mapping[str, str] | None = None
+    options: Mapping[str, object] | None = None, environment: Mapping[str, str] | None = None
 ) -> Settings:
     """Merge command line (None = not given), environment and defaults.
 
@@ -309,7 +310,7 @@ def load_settings(
         text = env.get(_variable(f.name))
         if text is not None:
             values[f.name] = _parse(f.name, str(f.type), text)
-    values |= {name: value for name, value in (given or {}).items() if value is not None}
+    values |= {name: value for name, value in (options or {}).items() if value is not None}
     if "data_dir" in values:
         values["data_dir"] = Path(str(values["data_dir"])).expanduser().absolute()
     return Settings(**values)  # type: ignore[arg-type]
@@ -345,7 +346,9 @@ def _parse(name: str, kind: str, text: str) -> object:
 
 
 def _is_some_network(text: str) -> bool:
-    """Whether it names some addresses; were all of them believed, every client could lie about its own."""
+    """Whether the text is a network smaller than all addresses; trusting all would let clients forge
+    theirs.
+    """
     try:
         return ipaddress.ip_network(text).prefixlen > 0
     except ValueError:
@@ -361,12 +364,12 @@ def _is_unspecified(host: str) -> bool:
 
 def _is_origin(text: str) -> bool:
     try:
-        found = urlsplit(text)
+        url = urlsplit(text)
         return (
-            found.scheme in {"http", "https"}
-            and bool(found.hostname)
-            and (found.port or 0) > 0
-            and (f"{found.scheme}://{found.netloc}" == text and found.username is None)
+            url.scheme in {"http", "https"}
+            and bool(url.hostname)
+            and (url.port or 0) > 0
+            and (f"{url.scheme}://{url.netloc}" == text and url.username is None)
         )
     except ValueError:
         return False

@@ -1,11 +1,10 @@
-"""Who looked at what, and who could not get in: the audit rows that no change carries in its transaction.
+"""Audit rows for read access and denied access, which have no transaction of their own.
 
-    trail.opened(who, "report.opened", "session", sid)    # a row each time
-    trail.watched(who, "signals.opened", "session", sid)  # of what a page asks for again and again
+    trail.opened(who, "report.opened", "session", sid)    # one row per call
+    trail.watched(who, "signals.opened", "session", sid)  # for repeated requests of a page
 
-A disk that refuses to be written must not stop people from reading: rows wait in memory, each with its own
-time and a line in the log, and are written in order before the next row that is. When too many wait, nothing
-more is shown.
+Reading must remain possible while the disk is not writable: rows are then queued in memory, each with its
+time and a log line, and written in order before the next row. When the queue is full, reads are refused.
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ _MOST_WATCHED: Final = 10_000
 
 
 class SignedIn(audit.Actor, Protocol):
-    """Who looks at something: a person and the sign-in through which the request came."""
+    """A signed-in user and the sign-in of the request."""
 
     @property
     def login_id(self) -> str:
-        """Row of `login_session`."""
+        """Primary key in `login_session`."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class _Row:
 
 
 class AuditTrail:
-    """The way of those rows into the table `audit`; any thread may use it.
+    """Writes access rows to the table `audit`; thread-safe.
 
     Parameters
     ----------
@@ -81,85 +80,87 @@ class AuditTrail:
 
     def record_opened(
         self,
-        who: SignedIn,
+        user: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,
         detail: Mapping[str, Any] | None = None,
     ) -> None:
-        """Write down that somebody opened something, before it is shown.
+        """Record that a user opens a resource, before it is shown.
 
         Raises
         ------
         OperationalError
-            too many rows wait for the disk already, or the database is busy.
+            the queue for the disk is full, or the database is busy.
         """
-        self._add(_Row(who, action, resource, resource_id, dict(detail or {})))
+        self._add(_Row(user, action, resource, resource_id, dict(detail or {})))
 
     def record_watched(
         self,
-        who: SignedIn,
+        user: SignedIn,
         action: str,
         resource: str,
         resource_id: str | None,
         detail: Mapping[str, Any] | None = None,
     ) -> None:
-        """Do the same once in QUIET_S for each sign-in, action and resource; raises as `record_opened`."""
-        self._record_once(who.login_id, _Row(who, action, resource, resource_id, dict(detail or {})))
+        """Record access once in QUIET_S for each sign-in, action and resource; raises like
+        `record_opened`.
+        """
+        self._record_once(user.login_id, _Row(user, action, resource, resource_id, dict(detail or {})))
 
-    def record_tried(self, who: audit.Actor, action: str, resource: str, resource_id: str) -> None:
-        """Write down what somebody could not open, once in QUIET_S for each account, action and resource.
+    def record_tried(self, user: audit.Actor, action: str, resource: str, resource_id: str) -> None:
+        """Record denied access, once in QUIET_S for each account, action and resource.
 
-        Never raises for the database: the answer must not tell that there is something.
+        Does not raise for database errors: the response must not reveal that the resource exists.
         """
         with contextlib.suppress(SQLAlchemyError):
-            self._record_once(who.user_id, _Row(who, action, resource, resource_id, {}))
+            self._record_once(user.user_id, _Row(user, action, resource, resource_id, {}))
 
-    def _record_once(self, by: str, row: _Row) -> None:
-        key = (by, row.action, row.resource_id)
-        at = self._clock()
+    def _record_once(self, owner: str, row: _Row) -> None:
+        key = (owner, row.action, row.resource_id)
+        time = self._clock()
         with self._guard:
-            if at - self._watched.get(key, -QUIET_S) < QUIET_S:
+            if time - self._watched.get(key, -QUIET_S) < QUIET_S:
                 return
             if len(self._watched) >= _MOST_WATCHED:
-                self._watched = {k: t for k, t in self._watched.items() if at - t < QUIET_S}
+                self._watched = {k: t for k, t in self._watched.items() if time - t < QUIET_S}
         self._add(row)
         with self._guard:
-            self._watched[key] = at
+            self._watched[key] = time
 
     def record_refused(self, action: str, resource: str, resource_id: str | None, address: str) -> None:
-        """Write down that somebody at an address could not get in; never raises for the disk.
+        """Record a failed sign-in from an address; does not raise for disk errors.
 
-        What was typed is not kept: people type passwords into the field of the name. At most MOST_REFUSED
-        rows an hour; the next one says in `more` how many came between.
+        The input is not stored, as users type passwords into the name field. At most MOST_REFUSED rows are
+        written per hour; the next row gives the number of suppressed ones in `more`.
         """
-        at = self._clock()
+        time = self._clock()
         with self._guard:
-            while self._refused and self._refused[0] <= at - _HOUR_S:
+            while self._refused and self._refused[0] <= time - _HOUR_S:
                 self._refused.popleft()
             if len(self._refused) >= MOST_REFUSED:
                 self._uncounted += 1
                 return
-            self._refused.append(at)
+            self._refused.append(time)
             more, self._uncounted = self._uncounted, 0
         detail = {"address": address[:64]} | ({"more": more} if more else {})
         with contextlib.suppress(SQLAlchemyError):
             self._add(_Row(None, action, resource, resource_id, detail))
 
     def flush(self) -> bool:
-        """Write the rows that wait; whether none waits any more. Raises SQLAlchemyError but for a refusal."""
+        """Write the queued rows; return whether all are written. Raises errors other than disk failures."""
         self._is_refused()
         return not self._waiting
 
     @contextlib.asynccontextmanager
     async def run(self) -> AsyncIterator[None]:
-        """Try again now and then while the block runs, and once more at its end."""
-        again = asyncio.create_task(self._again())
+        """Retry periodically while the context is active, and once more at its end."""
+        retrying = asyncio.create_task(self._again())
         try:
             yield
         finally:
-            again.cancel()
-            await asyncio.gather(again, return_exceptions=True)
+            retrying.cancel()
+            await asyncio.gather(retrying, return_exceptions=True)
             with contextlib.suppress(SQLAlchemyError):
                 await asyncio.to_thread(self.flush)
             if self._waiting:
@@ -190,7 +191,7 @@ class AuditTrail:
             )  # fmt: skip
 
     def _is_refused(self) -> bool:
-        """Write the rows that wait; whether the disk refused them. Raises what is no refusal."""
+        """Write the queued rows; return whether the disk refused. Raises other errors."""
         try:
             self._write()
         except Exception as error:
@@ -200,14 +201,14 @@ class AuditTrail:
         return False
 
     def _write(self) -> None:
-        """Write all rows in order; what was not committed goes on waiting."""
+        """Write all rows in order; uncommitted rows remain queued."""
         with self._turn:
             while self._waiting:
                 rows = [self._waiting[i] for i in range(min(len(self._waiting), _AT_ONCE))]
                 with self._db.write() as c:
                     for row in rows:
                         audit.record(
-                            c, row.actor, row.action, row.resource, row.resource_id, row.detail, at=row.at
+                            c, row.actor, row.action, row.resource, row.resource_id, row.detail, time=row.at
                         )
                 for _ in rows:
                     self._waiting.popleft()

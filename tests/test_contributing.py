@@ -124,7 +124,7 @@ def test_a_parameter_that_is_not_in_the_document_is_found(added: ParameterEntry)
     text = PAGE.read_text("utf-8")
     assert added.name not in text
     assert f"| `{added.name}` | {added.label} | ° |" in render_page(text)
-    assert "most − least" in text
+    assert "maximum − minimum" in text
 
 
 def _measured_names(tracks: Tracks) -> set[str]:

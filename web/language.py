@@ -1,9 +1,8 @@
-"""The languages of the pages: English is written in the sources, the others are catalogues in web/texts.
+"""Languages of the pages: English in the sources, others as catalogues in web/texts.
 
-A message is an English text with `{placeholders}`: what a template, a page module or `core` says. A sentence
-that was made from it, now or in a result stored years ago, is found again by the pattern of the message; what
-stands in its placeholders is translated by itself, numbers and dates by the locale
-(docs/how-to/languages.md).
+A message is an English text with `{placeholders}`; a `Message` of core holds it together with its values.
+Each is written as its type asks: a number by the locale, a word of the product by the catalogue, user text as
+it is. Sentences without a template go to `web/stored_sentences.py` (docs/how-to/languages.md).
 """
 
 from __future__ import annotations
@@ -12,377 +11,116 @@ import datetime as dt
 import functools
 import hashlib
 import json
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Final
 
 from babel import Locale
-from babel.dates import format_date
 from babel.messages.pofile import read_po
-from babel.numbers import format_decimal
 
-LANGUAGES: Final[Mapping[str, str]] = {"en": "English", "de": "Deutsch"}
-"""Code of a language → its own name; the first is that of the sources."""
-
-SOURCE: Final = next(iter(LANGUAGES))
-
-MONTHS: Final = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
-
-PLACEHOLDER: Final = re.compile(r"\{(\w*)\}")
-
-QUOTED: Final = re.compile(r"“((?:[^“”]|“[^“”]*”)*)”")
-"""A quotation: nothing in it is translated, unless a message itself has these words in quotation marks."""
-
-QUOTATION_MARKS: Final[Mapping[str, str]] = {"de": "„{}“"}
-
-IDENTIFIERS: Final = re.compile(r"(by|column|device|device_id|duplicate_of|file|file_name|ids)\d*")
-"""Placeholders of messages that hold what a person typed or uploaded, quoted or not."""
-
-OWN_WORDS: Final = frozenset({"kind", "label", "protocol"})
-"""Placeholders that hold words of the product even in quotation marks."""
-
-LONGEST: Final = 500
-"""Characters up to which a text is looked for as a whole; a longer one by its sentences."""
-
-MOST_PARTS: Final = 12
-
-FIRST_MASK: Final = 0xE000
-MOST_MASKS: Final = 1000
-"""Signs of the private use area that stand for quotations and values while a sentence is translated."""
-
-STRONG: Final = 12
-"""Letters of its own from which on a message is not mistaken for another."""
-
-_DECIMAL: Final = re.compile(r"(?<![\w.,])(?<!BY )(\d+)\.(\d+)(?![\d.])")
-_DATE: Final = re.compile(rf"\b(\d{{1,2}}) ({'|'.join(MONTHS)})(?: (\d{{4}}))?\b")
-_MEASURED: Final = re.compile(
-    r"([−+±≤≥<>]?\d[\d.,−±–\u2009\u202f ]*?)([\u2009\u202f ]?)([^\d\s.,].*)", re.DOTALL
+from sagittal.core.message import PLACEHOLDER, Message, Value, parse_template
+from sagittal.core.user_text import UserText
+from sagittal.web.message_format import (
+    ValueFormat,
+    fill_placeholders,
+    has_words,
+    match_case,
 )
-"""A number with its unit."""
-_NUMBERED: Final = re.compile(
-    r"(.*[^\W\d_])((?:[\u2009\u202f ][±−+]?[\u2009\u202f ]?\d[\d.]*[ \u2009\u202f]?[°%]?)+)", re.DOTALL
-)
-"""A word with its number."""
-_SENTENCE: Final = re.compile(r"(?<=[.!?…])(?<!et al\.)\s+(?=[A-Z0-9“])")
-_JOINS: Final = ("; ", " · ", " → ", " | ", ": ", ", ", " – ", " and ")
-"""What pages put between parts that are messages of their own, the strongest first."""
+from sagittal.web.stored_sentences import SentenceFinder
 
-CITED: Final = re.compile(
-    r"\b(19|20)\d\d\b.*(:|\d\(\d|Proc\.|Conf|Sens|IEEE)|^[A-Z][a-z]+(Martin)?(19|20)\d\d|et al\. (19|20)\d\d$"
-)
-"""References to papers stay as they are written."""
+SOURCE: Final = "en"
+
+TEXTS: Final = Path(__file__).parent / "texts"
+
+
+def _name_language(code: str) -> str:
+    name = Locale.parse(code).get_display_name() or code
+    return name[0].upper() + name[1:]
+
+
+LANGUAGES: Final[Mapping[str, str]] = {
+    code: _name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
+}
+"""Code of a language → its own name; the first is that of the sources, every catalogue is another."""
 
 
 def choose_language(accepted: str | None) -> str:
-    """The language of the pages that a browser's Accept-Language asks for first.
+    """Choose the language of the pages from a browser's Accept-Language.
 
     >>> choose_language("fr-CH, de-CH;q=0.9, en;q=0.8"), choose_language("de;q=0.2, en")
     ('de', 'en')
     """
-    asked: list[tuple[float, str]] = []
+    preferences: list[tuple[float, str]] = []
     for part in (accepted or "").split(","):
         tag, _, quality = part.strip().partition(";q=")
         try:
             weight = float(quality or 1)
         except ValueError:
             continue
-        asked.append((-weight, tag.split("-")[0].strip().lower()))
+        preferences.append((-weight, tag.split("-")[0].strip().lower()))
     return next(
-        (tag for weight, tag in sorted(asked, key=lambda a: a[0]) if weight and tag in LANGUAGES), SOURCE
+        (tag for weight, tag in sorted(preferences, key=lambda a: a[0]) if weight and tag in LANGUAGES),
+        SOURCE,
     )
 
 
 class Catalogue:
-    """The texts of one language.
+    """Translations of one language.
 
     Parameters
     ----------
-    messages : English text with {placeholders} → text of the language with the same, or some of them.
+    messages : English text with {placeholders} → translation with the same placeholders, or some of them.
     """
 
     def __init__(self, language: str, messages: Mapping[str, str]) -> None:
         self.language = language
         self.messages = messages
-        self._locale = Locale.parse(language)
-        self._folded = {text.casefold(): said for text, said in messages.items()}
-        self._patterns = [_Pattern(text, said) for text, said in messages.items() if PLACEHOLDER.search(text)]
-        # of two that fit, the one with more words of its own
-        self._patterns.sort(key=lambda p: -p.literal)
-        self._own_quotations = {quoted for text in messages for quoted in QUOTED.findall(text)}
-        self._known = functools.lru_cache(maxsize=20_000)(self._find)
+        self._values = ValueFormat(language)
+
+    @functools.cached_property
+    def _sentences(self) -> SentenceFinder:
+        return SentenceFinder(self.messages, self._values)
+
+    def find(self, text: str) -> str | None:
+        """A text in this language; None where no part of it is made from a message."""
+        said = self._render(text) if isinstance(text, Message) else self.messages.get(text)
+        return self._sentences.find(text) if said is None else said
+
+    def translate(self, text: str) -> str:
+        """Translation of a text, English if it matches no message."""
+        translation = self.find(text)
+        return text if translation is None else translation
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
         """The text of a message with values that are said already; English where the catalogue has none."""
         return fill_placeholders(self.messages.get(message, message), values)
 
-    def find(self, text: str) -> str | None:
-        """A text in this language; None where no part of it is made from a message."""
-        masked, quotations = self._mask(text)
-        known = self._known(masked)
-        said = self._loosely(masked.strip()) if known is None else known
-        return None if said is None else self._unmask(said, quotations)
-
-    def _mask(self, text: str) -> tuple[str, list[str]]:
-        """Put a sign for each quotation, which no message has and no number is part of."""
-        quotations: list[str] = []
-
-        def mask(found: re.Match[str]) -> str:
-            if found[1] in self._own_quotations or len(quotations) == MOST_MASKS:
-                return found[0]
-            quotations.append(found[1])
-            return f"“{chr(FIRST_MASK + len(quotations) - 1)}”"
-
-        return QUOTED.sub(mask, text), quotations
-
-    def _unmask(self, said: str, quotations: Sequence[str]) -> str:
-        marks = QUOTATION_MARKS.get(self.language, "“{}”")
-        opening, closing = marks.split("{}")
-        said = said.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
-        for i, quoted in enumerate(quotations):
-            mask = chr(FIRST_MASK + i)
-            said = said.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
-        return said
-
-    def translate(self, text: str) -> str:
-        """A text in this language, English where it is made from no message."""
-        known = self.find(text)
-        return text if known is None else known
-
-    def _loosely(self, text: str) -> str | None:
-        """A sentence with words of somebody else in it, or sentences of which some are known."""
-        made = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
-        made = made or self._by_sentences(_SENTENCE.split(text), partly=True)
-        return text if made is None and CITED.search(text) else made
-
-    def _find(self, text: str) -> str | None:
-        inner = text.strip()
-        if not inner:
-            return text
-        said = (
-            self._exact(inner)
-            or self._plain(inner)
-            or (self._made(inner) if len(inner) <= LONGEST else None)
-            or self._by_sentences(_SENTENCE.split(inner), partly=False)
-        )
-        return None if said is None else text.replace(inner, said, 1)
-
-    def _exact(self, text: str) -> str | None:
-        said = self.messages.get(text)
-        if said is None:
-            folded = self._folded.get(text.casefold())
-            said = None if folded is None else _with_case(text, folded)
-        return said
-
-    def _made(self, text: str) -> str | None:
-        return (
-            self._by_pattern(text, strong=True)
-            or self._before_stop(text)
-            or self._by_parts(text)
-            or self._by_pattern(text, strong=False)
-            or self._measured(text)
-        )
-
-    def _before_stop(self, text: str) -> str | None:
-        """A message after which a page has set a full stop."""
-        if text[-1] not in ".:;" or len(text) < 2:
-            return None
-        before = self._known(text[:-1])
-        return None if before is None else before + text[-1]
-
-    def _plain(self, text: str) -> str | None:
-        """A date, a number, or a name of capitals."""
-        date = _DATE.fullmatch(text)
-        if date:
-            return self._date(date)
-        found = _MEASURED.fullmatch(text)
-        if found and found[3] in self.messages:
-            return f"{self._localise(found[1])}{found[2]}{self.messages[found[3]]}"
-        if not re.search(r"[a-zäöüß]", re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", "", text)):
-            # numbers, single letters, names of capitals
-            said = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
-            return self._localise(text) if said is None else said
-        return None
-
-    def _measured(self, text: str) -> str | None:
-        """A number and its unit, or a word and its number."""
-        numbered = _NUMBERED.fullmatch(text)
-        if numbered and (word := self._known(numbered[1])) is not None:
-            return word + self._localise(numbered[2])
-        found = _MEASURED.fullmatch(text)
-        if not found:
-            return None
-        unit = self._exact(found[3]) or self._by_pattern(found[3], strong=False)
-        if unit is None and re.fullmatch(r"\S{1,7}", found[3]):
-            unit = found[3]  # m/s, kHz, MB
-        return None if unit is None else f"{self._localise(found[1])}{found[2]}{unit}"
-
-    def _date(self, found: re.Match[str]) -> str:
-        day, month, year = found.groups()
-        value = dt.date(int(year or 2000), MONTHS.index(month) + 1, int(day))
-        return self.day(value) if year else str(format_date(value, "d. MMM", locale=self._locale))
-
-    def _by_pattern(self, text: str, *, strong: bool, loose: bool = False) -> str | None:
-        """A sentence that was made from a message; `loose` = whatever stands in its placeholders."""
-        for pattern in self._patterns:
-            if pattern.is_strong != strong:
-                continue
-            for values in pattern.match(text):
-                spoken = [value for name, value in values.items() if name not in pattern.verbatim]
-                if all(map(self._stands_alone, spoken)) or (loose and not any(map(_SENTENCE.search, spoken))):
-                    return _with_case(text, self._fill_pattern(pattern, values))
-        return None
-
-    def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
-        """The text of a message whose values are not said yet; numbers are localised, except in user text."""
-        said: dict[str, str] = {}
-        settled: dict[str, str] = {}
-        for n, (name, value) in enumerate(values.items()):
-            known = value if name in pattern.verbatim else self._known(value)
-            if known is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", known)):
-                mask = chr(FIRST_MASK + MOST_MASKS + n)
-                said[name], settled[mask] = mask, known
-            else:
-                # a number may stand in two placeholders side by side
-                said[name] = value if known is None else known
-        filled = self._localise(fill_placeholders(pattern.said, said))
-        return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
-
-    def _stands_alone(self, value: str) -> bool:
-        """Whether a value is a word or a message by itself, not a piece of another sentence."""
-        return (
-            not re.search(r"\s", value.strip())
-            or self._known(value) is not None
-            or (not _SENTENCE.search(value) and CITED.search(value) is not None)
-        )
-
-    def _by_parts(self, text: str) -> str | None:
-        """A text of parts that are messages."""
-        for join in _JOINS:
-            if text.count(join) >= MOST_PARTS:
-                continue
-            at = text.rfind(join)
-            while at > 0:
-                said = self._join(text[:at], join, text[at + len(join) :])
-                if said is not None:
-                    return said
-                at = text.rfind(join, 0, at)
-        return None
-
-    def _join(self, first: str, join: str, second: str) -> str | None:
-        if not first or not second:
-            return None
-        # "; and so on" may be a message with what joins it
-        tail = self.messages.get(f"{join}{second}".strip()) or self._by_pattern(
-            f"{join}{second}".strip(), strong=True
-        )
-        head = self._known(first)
-        if head is None:
-            head = self.messages.get(f"{first}{join.rstrip()}")
-            if head is not None and (rest := self._known(second)) is not None:
-                return f"{head} {rest}"
-            return None
-        if tail is not None:
-            return f"{head}{tail}" if tail[0] in ",;:" else f"{head} {tail}"
-        rest = self._known(second)
-        if rest is None:
-            return None
-        return (
-            f"{head} {self.messages.get('and', 'and')} {rest}" if join == " and " else f"{head}{join}{rest}"
-        )
-
-    def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
-        """Sentences one after another, those of one message together; `partly` = some may stay."""
-        said: list[str] = []
-        found = False
-        while sentences and (len(sentences) > 1 or said):
-            for n in range(len(sentences), 0, -1):
-                whole = " ".join(sentences[:n])
-                known = self._exact(whole)
-                if known is None and len(whole) <= LONGEST:
-                    known = self._by_pattern(whole, strong=True, loose=partly)
-                if known is None and n == 1:
-                    known = self._known(whole)
-                if known is None and n == 1 and not partly:
-                    return None
-                if known is not None or n == 1:
-                    said.append(whole if known is None else known)
-                    found = found or known is not None
-                    sentences = sentences[n:]
-                    break
-        return " ".join(said) if found else None
-
-    def _localise(self, text: str) -> str:
-        """Numbers and dates inside a text as this language writes them."""
-        mark = format_decimal(0.1, locale=self._locale)[1]
-        return _DECIMAL.sub(rf"\1{mark}\2", _DATE.sub(self._date, text))
-
     def day(self, value: dt.date | dt.datetime) -> str:
         """A date as "18.11.2026"."""
-        return str(format_date(value, "medium", locale=self._locale))
+        return self._values.day(value)
 
+    def _render(self, message: Message) -> str | None:
+        """The text of a template with its values; None where the catalogue does not have it."""
+        identifier, formats = parse_template(message.template)
+        said = self.messages.get(identifier)
+        if said is None:
+            if has_words(identifier):
+                return None
+            said = identifier
+        values = {name: self._write(message.values[name], spec) for name, spec in formats.items()}
+        return match_case(message, fill_placeholders(self._values.mark_quotations(said), values))
 
-def find_verbatim(message: str) -> frozenset[str]:
-    """Placeholders of a message that hold user text: those in quotation marks, and `IDENTIFIERS`.
-
-    >>> sorted(find_verbatim("Sensor {device}: {value} Hz in '{name}' and “{title}”."))
-    ['device', 'name', 'title']
-    """
-    quoted = re.findall(r"'\{(\w+)\}'|“\{(\w+)\}”", message)
-    names = [name for name in PLACEHOLDER.findall(message) if IDENTIFIERS.fullmatch(name)]
-    return frozenset([*names, *(one or other for one, other in quoted)]) - OWN_WORDS
-
-
-class _Pattern:
-    """How the sentences of one message look."""
-
-    def __init__(self, text: str, said: str) -> None:
-        self.said = said
-        self.verbatim = find_verbatim(text)
-        pieces = PLACEHOLDER.split(text)
-        self.names = pieces[1::2]
-        literals = pieces[::2]
-        self.literal = sum(len(piece.strip()) for piece in literals)
-        self.is_strong = len(re.findall(r"[^\W\d_]", "".join(literals))) >= STRONG
-        self._stops = not literals[-1] or literals[-1].endswith(".")
-        if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
-            self._stops = False  # what stands last is no sentence
-        self._longest = max(literals, key=len).casefold()
-        first, *rest = map(re.escape, literals)
-        # of two values without a word between, the one before is a number and the other its unit
-        forms = [
-            first
-            + "".join(
-                (value if piece or i == len(rest) else before) + piece for i, piece in enumerate(rest, 1)
-            )
-            for value, before in (("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"), ("(.+?)", "(.+?)"), ("(.+)", "(.+)"))
-        ]
-        self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
-
-    def match(self, text: str) -> Iterator[dict[str, str]]:
-        """What may stand in the placeholders; nothing if the text is not made from this message."""
-        if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
-            return
-        before: tuple[str, ...] = ()
-        for form in self._forms:
-            found = form.fullmatch(text)
-            if found is not None and found.groups() != before:
-                before = found.groups()
-                yield dict(zip(self.names, before, strict=True))
-
-
-def fill_placeholders(said: str, values: Mapping[str, str]) -> str:
-    """A text with values in the place of its `{placeholders}`; one without a value stays."""
-    return PLACEHOLDER.sub(lambda m: values.get(m[1], m[0]), said)
-
-
-def _with_case(text: str, said: str) -> str:
-    """A capital where the English begins with one; German nouns keep theirs."""
-    return said[:1].upper() + said[1:] if text[:1].isupper() else said
+    def _write(self, value: Value, spec: str) -> str:
+        """A value as this language writes it."""
+        if isinstance(value, dt.date) and not spec:
+            return self.day(value)
+        if isinstance(value, str):
+            return str(value) if isinstance(value, UserText) else self.translate(value)
+        return self._values.localise(format(value, spec))
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
-    """Message, text and the files it comes from, of every translated message of a .po file."""
+    """Yield message, translation and source files of every translated message of a .po file."""
     with path.open("rb") as file:
         for entry in read_po(file):
             if entry.id and entry.string:
@@ -391,7 +129,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
 
 def catalogue_path(language: str) -> Path:
     """Where the texts of a language are."""
-    return Path(__file__).parent / "texts" / f"{language}.po"
+    return TEXTS / f"{language}.po"
 
 
 SCRIPTS: Final = "web/static/js/"
@@ -430,24 +168,24 @@ SCRIPT_PLACES: Final = (
 
 @functools.cache
 def script_texts(language: str) -> tuple[str, bytes]:
-    """What the scripts say in a language as JSON, and the hash of it that its address carries."""
-    said = {
+    """Translations used by scripts as JSON, and their hash for the URL."""
+    texts = {
         text: words
         for text, words, files in read_messages(catalogue_path(language))
         if any(name.startswith(SCRIPT_PLACES) for name in files)
     }
-    content = json.dumps(said, ensure_ascii=False, separators=(",", ":")).encode()
+    content = json.dumps(texts, ensure_ascii=False, separators=(",", ":")).encode()
     return hashlib.sha256(content).hexdigest()[:16], content
 
 
 @functools.cache
 def load_catalogue(language: str) -> Catalogue:
-    """The catalogue of a language other than that of the sources, read once."""
+    """Load the catalogue of a language other than English, cached."""
     return Catalogue(
         language,
         {
-            text: said
-            for text, said, files in read_messages(catalogue_path(language))
+            text: translation
+            for text, translation, files in read_messages(catalogue_path(language))
             # the sentences of scripts are made in the browser
             if not (PLACEHOLDER.search(text) and all(name.startswith(SCRIPTS) for name in files))
         },

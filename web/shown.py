@@ -1,4 +1,4 @@
-"""What the templates of a language call: every text and every value that a page shows goes through here."""
+"""Translation functions for templates: every text and value on a page passes through here."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FIGURE_TEXT: Final = re.compile(
 
 
 class Shown:
-    """Texts and values as one language shows them.
+    """Formatting of texts and values in one language.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Shown:
 
     @property
     def functions(self) -> dict[str, Callable[..., object]]:
-        """What `sagittal.web.template_texts.speak_template` calls, by name."""
+        """Functions called by the output of `sagittal.web.template_texts.speak_template`, by name."""
         return {
             "say": self.say,
             "say_plain": self.say_plain,
@@ -52,7 +52,7 @@ class Shown:
 
     @property
     def filters(self) -> dict[str, Callable[..., object]]:
-        """The filters that this language has in its own way."""
+        """Filters specific to this language."""
         return {
             "day": lambda value: Verbatim(self._catalogue.day(value)),
             "moment": self._moment,
@@ -70,36 +70,36 @@ class Shown:
         return Verbatim(f"{self._catalogue.day(utc)}, {utc:%H:%M}")
 
     def say_plain(self, value: object) -> object:
-        """A value in an attribute."""
+        """Translate a value in an attribute."""
         if not isinstance(value, str) or isinstance(value, Verbatim) or hasattr(value, "__html__"):
             return value
         return self._catalogue.translate(value)
 
     def say(self, value: object) -> object:
-        """A value between tags; a sentence that no message is known for stays English, marked as such."""
+        """Translate a value between tags; unknown sentences stay English and are marked as such."""
         if not isinstance(value, str) or isinstance(value, Verbatim) or hasattr(value, "__html__"):
             return value
-        known = self._catalogue.find(value)
-        if known is None and re.search(r"[^\W\d_]{2}\s+[^\W\d_]{2}", value):
+        translation = self._catalogue.find(value)
+        if translation is None and re.search(r"[^\W\d_]{2}\s+[^\W\d_]{2}", value):
             return Markup('<span lang="en">{}</span>').format(value)
-        return value if known is None else known
+        return value if translation is None else translation
 
     def say_message(self, message: str, **values: object) -> Markup:
-        """A text of a template, which may hold entities, with values; they are escaped here."""
-        said = {name: str(escape(self.say_plain(value))) for name, value in values.items()}
-        return Markup(self._catalogue.fill(message, said))  # noqa: S704 - templates are ours, values escaped
+        """Translate a text of a template, which may contain entities; its values are escaped here."""
+        escaped = {name: str(escape(self.say_plain(value))) for name, value in values.items()}
+        return Markup(self._catalogue.fill(message, escaped))  # noqa: S704 - templates are ours, values escaped
 
     def say_figure(self, drawn: str) -> str:
-        """A figure with its labels and titles in the language."""
+        """Translate labels and titles of a figure."""
 
-        def speak(found: re.Match[str]) -> str:
-            opening, text = (found[1], found[2]) if found[1] else (found[3], found[4])
+        def speak(match: re.Match[str]) -> str:
+            opening, text = (match[1], match[2]) if match[1] else (match[3], match[4])
             return f"{opening}{escape(self._catalogue.translate(html.unescape(text)))}"
 
         return _FIGURE_TEXT.sub(speak, drawn)
 
     def say_members(self, value: Any, key: str = "") -> Any:
-        """What a page hands to its scripts, the words for people in the language."""
+        """Translate the user-visible texts of data passed to scripts."""
         if isinstance(value, Mapping):
             return {k: self.say_members(v, key if key in SPOKEN_MAPS else str(k)) for k, v in value.items()}
         if isinstance(value, list | tuple):

@@ -1,8 +1,8 @@
-"""The texts of a template: what stands between tags and in the attributes that people read.
+"""Translatable texts of templates, between tags and in user-visible attributes.
 
-Templates are written in English without marks. For another language `speak_template` puts a call around every
-text and every value shown there; `list_texts` gives the same messages to the catalogue. What a person typed
-or uploaded is `UserText` and is shown as it is.
+Templates are written in English without markers. For other languages `speak_template` wraps every text and
+displayed value in a call; `list_texts` lists the same messages for the catalogue. User input is `UserText`
+and is displayed unchanged.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from typing import Final
 
 from jinja2 import Environment, nodes
 
-from sagittal.web.language import PLACEHOLDER
+from sagittal.core.message import PLACEHOLDER
+from sagittal.web.message_format import has_words
 
 READ_ATTRIBUTES: Final = frozenset({"alt", "aria-label", "aria-description", "label", "placeholder", "title"})
 
@@ -23,36 +24,30 @@ _TOKEN: Final = re.compile(
 _ATTRIBUTE: Final = re.compile(r'(?<=\s)([\w-]+)="((?:[^"{]|\{\{.*?\}\}|\{%.*?%\}|\{)*)"', re.DOTALL)
 _EITHER: Final = re.compile(r"'([^']*)' if (.+?)(?: else '([^']*)')?", re.DOTALL)
 _PLURAL: Final = re.compile(r"plural\((.+), '([^']*)', '([^']*)'\)", re.DOTALL)
-_ENTITY: Final = re.compile(r"&\w+;")
 _PARSER: Final = Environment()  # noqa: S701 - only reads expressions
 
 
 def speak_template(source: str) -> str:
-    """The source with each text and shown value inside a call of `say` or, in attributes, `say_plain`."""
-    return "".join(_walk(source, lambda run, how: _speak(run, how)))
+    """Wrap each text and displayed value in a call of `say` or, in attributes, `say_plain`."""
+    return "".join(_walk(source, lambda run, function: _speak(run, function)))
 
 
 def list_texts(source: str) -> Iterator[str]:
-    """Every message of a template: its texts, and the strings in its expressions that read like one."""
-    found: list[str] = []
+    """All messages of a template: its texts, and strings in expressions that look like text."""
+    messages: list[str] = []
 
-    def keep(run: str, how: str) -> str:
-        found.extend(message for message, _ in _variants(_Run(run)))
+    def keep(run: str, function: str) -> str:
+        messages.extend(message for message, _ in _variants(_Run(run)))
         return run
 
     for _ in _walk(source, keep):
         pass
-    yield from (m for m in found if has_words(m))
+    yield from (m for m in messages if has_words(m))
     tree = _PARSER.parse(source)
-    counted = {id(word) for call in tree.find_all(nodes.Call) if _is_plural(call) for word in call.args}
+    plural_words = {id(word) for call in tree.find_all(nodes.Call) if _is_plural(call) for word in call.args}
     for node in tree.find_all((nodes.Const, nodes.Concat)):
-        if id(node) not in counted:
+        if id(node) not in plural_words:
             yield from _strings(node)
-
-
-def has_words(message: str) -> bool:
-    """Whether something of a message is to be translated."""
-    return re.search(r"[^\W\d_]{2}", PLACEHOLDER.sub(" ", _ENTITY.sub(" ", message))) is not None
 
 
 def _is_plural(call: nodes.Call) -> bool:
@@ -60,9 +55,9 @@ def _is_plural(call: nodes.Call) -> bool:
 
 
 class _Run:
-    """What stands between two tags or statements: text and `{{ expressions }}` in turn.
+    """Alternating text and `{{ expressions }}` between two tags or statements.
 
-    `lead` and `trail` are the white space around; `pieces` are text (even) and expressions (odd).
+    `lead` and `trail` are surrounding white space; `pieces` are text (even) and expressions (odd).
     """
 
     def __init__(self, run: str) -> None:
@@ -86,7 +81,9 @@ class _Run:
 
 
 def _walk(source: str, speak: Callable[[str, str], str]) -> Iterator[str]:
-    """The source in order, each run of text and values through `speak`, those of attributes too."""
+    """Yield the source in order, with runs of text and values, including attributes, passed through
+    `speak`.
+    """
     run = ""
     for part in _TOKEN.split(source):
         if part.startswith("{{") and not _is_markup(part):
@@ -100,41 +97,43 @@ def _walk(source: str, speak: Callable[[str, str], str]) -> Iterator[str]:
     yield speak(run, "say") if run else ""
 
 
-def _attribute(found: re.Match[str], speak: Callable[[str, str], str]) -> str:
-    name, value = found.groups()
+def _attribute(match: re.Match[str], speak: Callable[[str, str], str]) -> str:
+    name, value = match.groups()
     if name not in READ_ATTRIBUTES:
-        return found[0]
+        return match[0]
     return f'{name}="{"".join(_walk(value, lambda run, _: speak(run, "say_plain")))}"'
 
 
 def _is_markup(expression: str) -> bool:
-    """Whether an expression is a macro's call, or HTML made elsewhere: no part of a sentence."""
+    """Whether an expression is a macro call or ready-made HTML rather than part of a sentence."""
     inner = expression[2:-2].strip("-").strip()
     called = re.match(r"(\w+)\(", inner)
     is_macro = called is not None and called[1] != "plural"
     return is_macro or re.search(r"\|\s*(safe|tojson)\s*$", inner) is not None
 
 
-def _speak(text: str, how: str) -> str:
+def _speak(text: str, function: str) -> str:
     run = _Run(text)
     if not any(has_words(piece) for piece in run.pieces[::2]):
         # the white space of values alone stays as it is written
         return re.sub(
             r"\{\{(-?)(.*?)(-?)\}\}",
-            lambda m: f"{{{{{m[1]} {how}({m[2].strip()}) {m[3]}}}}}",
+            lambda m: f"{{{{{m[1]} {function}({m[2].strip()}) {m[3]}}}}}",
             text,
             flags=re.DOTALL,
         )
-    (message, call), *others = _variants(run)
-    said = _call(message, call, how)
-    for other, (condition, values) in others:
-        said = f"{_call(other, (condition, values), how)} if ({condition}) else ({said})"
-    return f"{run.lead}{{{{ {said} }}}}{run.trail}"
+    (message, call), *variants = _variants(run)
+    expression = _call(message, call, function)
+    for message_variant, (condition, values) in variants:
+        expression = (
+            f"{_call(message_variant, (condition, values), function)} if ({condition}) else ({expression})"
+        )
+    return f"{run.lead}{{{{ {expression} }}}}{run.trail}"
 
 
-def _call(message: str, call: tuple[str, dict[str, str]], how: str) -> str:
+def _call(message: str, call: tuple[str, dict[str, str]], function: str) -> str:
     values = "".join(f", {name}=({value})" for name, value in call[1].items())
-    return f"{how}_message({_quote(message)}{values})"
+    return f"{function}_message({_quote(message)}{values})"
 
 
 def _quote(text: str) -> str:
@@ -143,46 +142,48 @@ def _quote(text: str) -> str:
 
 
 def _variants(run: _Run) -> list[tuple[str, tuple[str, dict[str, str]]]]:
-    """Messages of a run with their conditions and values; several where a word depends on a condition.
+    """Messages of a run with their conditions and values; several if a word depends on a condition.
 
-    The first is that of every condition being false.
+    The first is for all conditions being false.
     """
-    found: list[tuple[str, list[str], dict[str, str]]] = [("", [], {})]
+    combinations: list[tuple[str, list[str], dict[str, str]]] = [("", [], {})]
     for i, piece in enumerate(run.pieces):
         if i % 2 == 0:
-            found = [(message + piece, conditions, values) for message, conditions, values in found]
+            combinations = [
+                (message + piece, conditions, values) for message, conditions, values in combinations
+            ]
             continue
         choice = _read_choice(piece)
         grown = []
         if choice:
             true, condition, false = choice
-            for message, conditions, values in found:
+            for message, conditions, values in combinations:
                 grown.append((message + false, [*conditions, f"not ({condition})"], values))
-            for message, conditions, values in found:
+            for message, conditions, values in combinations:
                 grown.append((message + true, [*conditions, condition], values))
         else:
-            for message, conditions, values in found:
+            for message, conditions, values in combinations:
                 name = _name(piece, values)
                 grown.append((f"{message}{{{name}}}", conditions, {**values, name: piece}))
-        found = grown
-    return [(" ".join(m.split()), (" and ".join(f"({c})" for c in cs), vs)) for m, cs, vs in found]
+        combinations = grown
+    return [(" ".join(m.split()), (" and ".join(f"({c})" for c in cs), vs)) for m, cs, vs in combinations]
 
 
 def _read_choice(expression: str) -> tuple[str, str, str] | None:
-    """The words where a condition holds, the condition, and the words where it does not."""
-    if counted := _PLURAL.fullmatch(expression):
-        return counted[2], f"({counted[1]}) == 1", counted[3]
+    """Text if a condition holds, the condition, and text if it does not."""
+    if plural := _PLURAL.fullmatch(expression):
+        return plural[2], f"({plural[1]}) == 1", plural[3]
     either = _EITHER.fullmatch(expression)
     return (either[1], either[2], either[3] or "") if either else None
 
 
-def _name(expression: str, taken: Container[str]) -> str:
-    """A name for a value: the last of its path."""
+def _name(expression: str, reserved: Container[str]) -> str:
+    """Placeholder name of a value: the last component of its path."""
     path = re.match(r"[\w.\[\]']*", expression.lstrip("("))
     words: list[str] = re.findall(r"[A-Za-z_]+", path[0] if path else "") or ["value"]
     name = words[-1]
     n = 2
-    while name in taken:
+    while name in reserved:
         name = f"{words[-1]}{n}"
         n += 1
     return name
@@ -215,7 +216,7 @@ def _strings(node: nodes.Node) -> Iterator[str]:
 
 
 def reads_like_text(text: str) -> bool:
-    """Whether a string of a program reads like words for people: a capital or a space, and no code."""
+    """Whether a string of a program is user-visible text: it has a capital or a space and is not code."""
     plain = PLACEHOLDER.sub("x", text)
     return (
         re.search(r"[a-z]{2} \w|\w [a-z]{2}|^[A-Z][a-z]", plain) is not None

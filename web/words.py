@@ -1,4 +1,4 @@
-"""Dates, sizes and numbers as the pages write them: English, a real minus, thin space before a unit."""
+"""Formatting of dates, sizes and numbers on pages: English, true minus sign, thin space before units."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import Any
 
 from markupsafe import Markup, escape
 
-from sagittal.web.language import MONTHS, fill_placeholders
+from sagittal.web.message_format import MONTHS, fill_placeholders
 
 
 class Verbatim(str):
-    """What is in the language of the page already, or in none: a date, the name of a file of ours, a hash."""
+    """Text that needs no translation: a formatted date, a generated file name, a hash."""
 
     __slots__ = ()
 
@@ -26,7 +26,7 @@ def day(value: dt.date | dt.datetime) -> str:
 
 
 def moment(value: dt.datetime) -> str:
-    """A time as "18 Nov 2026, 10:42" in UTC, the only time zone the server knows."""
+    """A time as "18 Nov 2026, 10:42" in UTC, the server's only time zone."""
     utc = value.astimezone(dt.UTC)
     return f"{day(utc)}, {utc:%H:%M}"
 
@@ -41,7 +41,7 @@ def filesize(size: float) -> str:
 
 
 def number(value: float | None, digits: int = 0) -> str:
-    """A number with a real minus and no negative zero; a dash where there is none."""
+    """A number with a true minus sign and no negative zero; a dash if missing."""
     if value is None:
         return "–"
     text = f"{value:.{digits}f}"
@@ -54,12 +54,12 @@ def seconds(value: float | None) -> str:
         return "–"
     if value < 120:
         return f"{value:.1f} s" if value < 60 else f"{value:.0f} s"
-    minutes, rest = divmod(round(value), 60)
-    return f"{minutes} min {rest} s"
+    minutes, remainder = divmod(round(value), 60)
+    return f"{minutes} min {remainder} s"
 
 
 def pattern(text: str) -> str:
-    """Escape text for the pattern attribute of an input; its `v` syntax refuses every needless escape."""
+    """Escape text for the pattern attribute of an input; its `v` syntax rejects unnecessary escapes."""
     return re.sub(r"[\^$\\.*+?()\[\]{}|/]", r"\\\g<0>", text)
 
 
@@ -70,28 +70,28 @@ _SCRIPTED = re.compile(r'#i-([\w-]+)|\bicon(?:: |\([^()"]*)"([\w-]+)"(?: : "([\w
 
 @functools.cache
 def find_scripted_icons() -> frozenset[str]:
-    """Icons that the pages' scripts show."""
+    """Icons used by the pages' scripts."""
     scripts = (Path(__file__).parent / "static" / "js").rglob("*.js")
-    found = (names for script in scripts for names in _SCRIPTED.findall(script.read_text("utf-8")))
-    return frozenset(name for names in found for name in names if name)
+    name_sets = (names for script in scripts for names in _SCRIPTED.findall(script.read_text("utf-8")))
+    return frozenset(name for names in name_sets for name in names if name)
 
 
 def used_icons(page: str) -> Markup:
-    """The page without the symbols of icons that neither it nor a script shows, a twentieth of a session."""
-    kept = find_scripted_icons().union(_SHOWN.findall(page))
-    symbols, end, rest = str(page).rpartition("</symbol>")
-    fewer = _ICON.sub(lambda icon: icon[0] if icon[1] in kept else "", symbols + end)
-    return Markup(fewer + rest)  # noqa: S704
+    """Remove unused icons from a page, a twentieth of the size of a session page."""
+    icons = find_scripted_icons().union(_SHOWN.findall(page))
+    symbols, end, tail = str(page).rpartition("</symbol>")
+    fewer = _ICON.sub(lambda icon: icon[0] if icon[1] in icons else "", symbols + end)
+    return Markup(fewer + tail)  # noqa: S704
 
 
 def fill_message(message: str, **values: object) -> Markup:
-    """A message of a template with values, which are escaped; the filter `filled`."""
-    said = {name: str(escape(value)) for name, value in values.items()}
-    return Markup(fill_placeholders(message, said))  # noqa: S704 - templates are ours, values escaped
+    """Fill a template message with escaped values; the filter `filled`."""
+    escaped = {name: str(escape(value)) for name, value in values.items()}
+    return Markup(fill_placeholders(message, escaped))  # noqa: S704 - templates are ours, values escaped
 
 
 def as_it_is(value: Any) -> Any:
-    """Return the value: nothing is translated into the language of the sources."""
+    """Return the value unchanged, as English needs no translation."""
     return value
 
 

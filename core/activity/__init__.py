@@ -1,5 +1,5 @@
-"""What a person does from hour to hour, from one sensor on the chest or the lower back.
+"""Daily-life monitoring: activities over hours and days, from one sensor on the chest or the lower back.
 
-Nazarahari 2021, chapter 7 (docs/science/activity.md). `monitor_activity` goes through a recording block by
-block, of whatever length; what it finds is an `ActivityResult` (core/activity/result.py).
+Nazarahari 2021, chapter 7 (docs/science/activity.md). `monitor_activity` processes a recording of any length
+block by block; the result is an `ActivityResult` (core/activity/result.py).
 """

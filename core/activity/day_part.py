@@ -1,7 +1,8 @@
-"""One day of frames → what happened in it: wear, upright, lying, leans, steps.
+"""One day of frames → wear, upright posture, lying, trunk leans and steps.
 
-A recording is gone through in days of 24 h from its start, each with what lies around it, so that nothing
-that crosses a border is missed; how the postures follow from it, core/activity/postures.py decides for all.
+A recording is processed in days of 24 h from its start, each with a margin on both sides, so that events
+across a day boundary are not missed; postures are then decided for the whole recording in
+core/activity/postures.py.
 """
 
 from __future__ import annotations
@@ -47,9 +48,10 @@ class Posture:
 
     Parameters
     ----------
-    known : (f,) it was worn and upright is known.
-    tilt : (f,) to any side, rad. lean : (f,) forward positive, rad; the tilt where forward is not known.
-    signed : (f,) forward is known.
+    known : (f,) sensor worn and upright direction known.
+    tilt : (f,) in any direction, rad. lean : (f,) forward positive, rad; equal to the tilt if forward is
+    unknown.
+    signed : (f,) forward direction known.
     """
 
     known: Bools
@@ -60,14 +62,14 @@ class Posture:
 
 @dataclass(frozen=True, eq=False)
 class DayPart:
-    """What one day of a recording tells, in s since its first sample; only what lies in it.
+    """Results of one day of a recording, in s since its first sample, restricted to that day.
 
     Parameters
     ----------
-    no_baseline : worn, upright not known. tilted : beyond the limit of lying, not still. step_kinds : (n,) of
-        the steps, 0 level, 1 up, 2 down, step_rocks, step_leans : (n,) rad, what tells it
-        (core/activity/stairs.py). inclination_deg : (seconds,) NaN =
-        unknown.
+    no_baseline : sensor worn, upright direction unknown. tilted : inclined past the lying limit, but not
+    still.
+    step_kinds : (n,) of the steps, 0 level, 1 up, 2 down. step_rocks, step_leans : (n,) rad, the features
+    used for that classification (core/activity/stairs.py). inclination_deg : (seconds,) NaN = unknown.
     """
 
     gaps: tuple[Window, ...]
@@ -89,11 +91,11 @@ class DayPart:
 def read_day(
     slab: Slab, day: Window, before: WearPeriod | None, thigh_m: float, params: ActivityParams
 ) -> DayPart:
-    """What happened from `day[0]` to `day[1]`, s.
+    """Analyse the time from `day[0]` to `day[1]`, s.
 
     Parameters
     ----------
-    slab : of the day and around it. before : the last period of wear before it, None without one.
+    slab : the day with its margins. before : the last wear period of the previous day, None without one.
     """
     frames = slab.frames
     offset = frames.first / FRAME_HZ
@@ -141,7 +143,7 @@ def read_day(
 
 
 def _describe_periods(periods: Sequence[WearPeriod], day: Window) -> tuple[WearPeriod, ...]:
-    """The periods of wear that reach into a day, cut to it."""
+    """The wear periods that overlap a day, clipped to it."""
     return tuple(
         describe_period(
             max(day[0], p.start_s),
@@ -181,7 +183,7 @@ def _are_upright(steps: Floats, frames: Frames, posture: Posture, params: Activi
 def _find_posture(
     frames: Frames, wear: Wear, walking: Bools, before: WearPeriod | None, params: ActivityParams
 ) -> tuple[Posture, list[WearPeriod]]:
-    """Tilt from the upright of each period; one that shows none takes that of its neighbour."""
+    """Tilt from the upright direction of each period; a period without one uses that of its neighbour."""
     n, offset = len(frames.valid), frames.first / FRAME_HZ
     groups = group_periods(wear, params.wear)
     own = [find_upright(frames, walking, group, params.upright) for group in groups]
@@ -214,7 +216,7 @@ def _find_forward(
     walking: Bools,
     params: ActivityParams,
 ) -> tuple[Posture, list[WearPeriod]]:
-    """Signed inclination where the leans of a period show forward."""
+    """Signed inclination in periods whose leans reveal the forward direction."""
     close, longest = round(NEAR_LYING_S * FRAME_HZ), round(params.upright.lean_s * FRAME_HZ)
     beside = mark_near(lying, close, len(walking))
     leans = [
@@ -244,7 +246,7 @@ def _find_forward(
 
 
 def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
-    """Mean inclination (seconds,) in degrees of every second of the day, NaN where it is not known."""
+    """Mean inclination (seconds,) in degrees for every second of the day, NaN if unknown."""
     a, b = (round(t * FRAME_HZ) - frames.first for t in day)
     found = np.full(-(-(b - a) // FRAME_HZ), np.nan)
     for part in _cut_hours(a, b):
@@ -260,13 +262,13 @@ def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
 
 
 def _cut_hours(a: int, b: int) -> Iterator[slice]:
-    """Frames a to b an hour at a time: what is worked out of them in double precision stays small."""
+    """Frames a to b in slices of one hour, which limits the memory of double-precision intermediates."""
     for first in range(a, b, 60 * PER_MINUTE):
         yield slice(first, min(b, first + 60 * PER_MINUTE))
 
 
 def _along(gravity: Singles, axis: Floats) -> Floats:
-    """Share (n,) of directions (n, 3) along an axis (3,), summed in double precision without a copy."""
+    """Projections (n,) of directions (n, 3) on an axis (3,), summed in double precision without a copy."""
     return np.asarray(np.einsum("ni,i->n", gravity, axis, dtype=np.float64))
 
 

@@ -1,4 +1,4 @@
-"""Ten frames a second of a worn sensor, and those of a day kept in arrays that are made once.
+"""Features at ten frames per second of a body-worn sensor, and a preallocated store for one day of them.
 
 Equations: docs/science/activity.md, "Reduction".
 """
@@ -24,15 +24,15 @@ PER_MINUTE: Final = 60 * FRAME_HZ
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Ten frames a second, f of them, in single precision: a day of them is held at a time.
+    """Features of f frames at ten per second, in single precision: one day is held in memory at a time.
 
     Parameters
     ----------
-    first : number of the first frame since the recording's first sample. valid : (f,) every sample is there.
+    first : index of the first frame since the recording's first sample. valid : (f,) no sample is missing.
     gravity : (f, 3) low-passed specific force, m/s², sensor axes. up : (f,) acceleration along it, mean of
         the frame, m/s². spread : (f,) mean square of |acc| about its mean over 1 s, (m/s²)².
     sd, wobble : (f / 600, 3) per minute: standard deviation of the samples and of their means over 1 s, m/s²;
-        NaN where less than half of it was measured.
+        NaN if less than half of the minute was measured.
     """
 
     first: int
@@ -46,7 +46,7 @@ class Frames:
 
 @dataclass(frozen=True, eq=False)
 class Slab:
-    """Frames of one slab, the steps and the turns that lie in it (s since the recording's first sample)."""
+    """Frames of one slab with the steps and turns in it (s since the recording's first sample)."""
 
     frames: Frames
     steps_s: tuple[float, ...]
@@ -54,13 +54,15 @@ class Slab:
 
 
 class FrameStore:
-    """Frames of a day and of what lies around it: arrays that are made once and used day after day.
+    """Preallocated arrays for the frames of one day and its margins, reused day after day.
 
-    Pieces that came and went, a day of them, would leave the process' memory in holes.
+    Allocating and freeing the pieces of each day would fragment the memory of the process.
     """
 
     def __init__(self, room: int) -> None:
-        """Make room for so many frames, a whole number of minutes; pages are touched when they are filled."""
+        """Reserve room for a number of frames, a whole number of minutes; memory pages are touched only
+        when filled.
+        """
         minutes = room // PER_MINUTE
         self._kept = Frames(
             0,
@@ -75,18 +77,18 @@ class FrameStore:
 
     @property
     def end(self) -> int:
-        """Number of the frame that comes next."""
+        """Index of the next frame."""
         return self._first + self._count
 
     def append(self, more: Frames) -> None:
-        """Keep the frames that follow; only the last of a recording may end within a minute."""
+        """Append consecutive frames; only the last ones of a recording may end within a minute."""
         end = self._count + len(more.valid)
         for kept, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
             kept[:] = new[: len(kept)]
         self._count = end
 
     def view(self, end: int) -> Frames:
-        """What is kept up to frame `end`, as long as nothing is dropped."""
+        """Stored frames up to `end`; valid until the next `drop_before`."""
         kept, n = self._kept, min(end, self.end) - self._first
         minutes = -(-n // PER_MINUTE)
         return Frames(
@@ -100,7 +102,7 @@ class FrameStore:
         )
 
     def drop_before(self, first: int) -> None:
-        """Let go of the frames before a minute's first."""
+        """Discard the frames before the first frame of a minute."""
         cut = min(self._count, max(0, first - self._first))
         left = self._count - cut
         whole = -(-left // PER_MINUTE) * PER_MINUTE
@@ -111,7 +113,7 @@ class FrameStore:
 
 
 def _list_columns(frames: Frames, first: int = 0, end: int | None = None) -> list[NDArray[Any]]:
-    """Columns of the frames from a minute's first to `end`, as they lie in memory."""
+    """Columns of the frames from the first frame of a minute to `end`, in storage order."""
     minutes = slice(first // PER_MINUTE, None if end is None else -(-end // PER_MINUTE))
     part = slice(first, end)
     return [
@@ -121,5 +123,5 @@ def _list_columns(frames: Frames, first: int = 0, end: int | None = None) -> lis
 
 
 def measure_length(x: Singles) -> Floats:
-    """Length (n,) of vectors (n, 3), in double precision without a copy of them."""
+    """Length (n,) of vectors (n, 3), in double precision without copying them."""
     return np.asarray(np.sqrt(np.einsum("ni,ni->n", x, x, dtype=np.float64)))

@@ -1,4 +1,4 @@
-"""The monitor of daily life: one sensor's recording, of whatever length, in bounded memory."""
+"""Daily-life monitor: processes a recording of any length from one sensor in bounded memory."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.bouts import Bout, plain_bouts
 from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import Window
 from sagittal.core.signals.sample_blocks import LongStream
@@ -50,11 +51,11 @@ def monitor_activity(
     params: ActivityParams | None = None,
     progress: Progress = lambda share: None,
 ) -> ActivityResult:
-    """Go through a recording of daily life.
+    """Analyse a daily-life recording.
 
     Parameters
     ----------
-    segment : "chest" or "pelvis". height_m : for the length of the thigh; None = nominal, with a notice.
+    segment : "chest" or "pelvis". height_m : to estimate thigh length; None = nominal height, with a notice.
 
     Raises
     ------
@@ -73,16 +74,16 @@ def calibrate_on_walks(
     height_m: float | None = None,
     params: ActivityParams | None = None,
 ) -> StairParams:
-    """A person's own limits of stairs from one recording in which they walked level, up and down.
+    """Personal stair thresholds from one recording of level walking, stair ascent and stair descent.
 
     Parameters
     ----------
-    walks : "walking", "stairs_up", "stairs_down" → when, s from the recording's first sample.
+    walks : "walking", "stairs_up", "stairs_down" → time window, s from the recording's first sample.
 
     Raises
     ------
-    SignalError as `monitor_activity`, and `walk_too_short` where one of them has fewer than `LEAST_STEPS`
-    steps to judge. ParameterError : `stairs_not_told_apart`.
+    SignalError as `monitor_activity`, and `walk_too_short` if one of them has fewer than `LEAST_STEPS` usable
+    steps. ParameterError : `stairs_not_told_apart`.
     """
     params = params or ActivityParams()
     parts, _ = _read_days(stream, segment, NOMINAL_HEIGHT_M if height_m is None else height_m, params)
@@ -97,8 +98,16 @@ def calibrate_on_walks(
         if count < LEAST_STEPS:
             raise SignalError(
                 "walk_too_short",
-                f"From {start_s:g} to {end_s:g} s only {count} {plural(count, 'step', 'steps')} can be "
-                f"judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without stopping.",
+                Message(
+                    f"From {{start_s:g}} to {{end_s:g}} s only {{count}} {plural(count, 'step', 'steps')} "
+                    "can be judged for '{kind}'; expected {LEAST_STEPS}. Record 20 steps of each without "
+                    "stopping.",
+                    start_s=start_s,
+                    end_s=end_s,
+                    count=count,
+                    kind=kind,
+                    LEAST_STEPS=LEAST_STEPS,
+                ),
                 sensor=stream.device_id,
                 t_s=start_s,
             )
@@ -114,12 +123,17 @@ def _read_days(
     params: ActivityParams,
     progress: Progress = lambda share: None,
 ) -> tuple[list[DayPart], float]:
-    """What happened on each day, and when the last one ends, s."""
+    """Results of each day, and the end of the last one, s."""
     if stream.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {stream.device_id} was recorded at {stream.rate_hz:g} Hz; at least "
-            f"{params.min_rate_hz:g} Hz are needed to find steps. Record at 25 Hz or more.",
+            Message(
+                "Sensor {device_id} was recorded at {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are "
+                "needed to find steps. Record at 25 Hz or more.",
+                device_id=stream.device_id,
+                rate_hz=stream.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=stream.device_id,
         )
     thigh = params.transitions.thigh_share * height_m
@@ -136,7 +150,7 @@ def _read_days(
 
 
 def _tell_hours(slabs: Iterator[Slab], duration_s: float, progress: Progress) -> Iterator[Slab]:
-    """The same slabs; after each whole hour of them `progress` hears how far they are."""
+    """Pass the slabs through, reporting `progress` after each full hour."""
     told = 0.0
     for slab in slabs:
         end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
@@ -147,7 +161,7 @@ def _tell_hours(slabs: Iterator[Slab], duration_s: float, progress: Progress) ->
 
 
 def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab, Window]]:
-    """Every day with what lies around it as one slab, and its range."""
+    """Yield every day with its margins as one slab, together with its time range."""
     per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
     per_slab = params.slab_s * FRAME_HZ
     kept = FrameStore((per_day + 2 * around + 1) * per_slab)
@@ -156,7 +170,7 @@ def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab,
     number = 0
 
     def look(until: int) -> tuple[Slab, Window]:
-        """The day and what lies around it."""
+        """The current day with its margins."""
         day = (number * DAY_SLABS_S, min(kept.end / FRAME_HZ, (number + 1) * DAY_SLABS_S))
         frames, end_s = kept.view(until), until / FRAME_HZ
         return Slab(
@@ -164,7 +178,7 @@ def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab,
         ), day
 
     def drop() -> None:
-        """Only what the day after this one needs stays."""
+        """Discard all data not needed for the next day."""
         nonlocal number, steps, turns
         number += 1
         first = max(0, number * per_day - around) * per_slab
@@ -194,7 +208,7 @@ def _put_together(
     notices: tuple[Notice, ...],
     params: ActivityParams,
 ) -> ActivityResult:
-    """Days → the whole: bouts and postures do not end at midnight."""
+    """Combine the days: bouts and postures may continue past midnight."""
     steps = np.concatenate([p.steps_s for p in parts]) if parts else np.empty(0)
     kinds = np.concatenate([p.step_kinds for p in parts]) if parts else np.empty(0, int)
     far = np.diff(steps, prepend=-np.inf) > 0.5 * params.steps.step_s[0]
@@ -244,7 +258,9 @@ def _put_together(
 def _meet(
     walks: Sequence[Bout], transitions: Sequence[PosturalTransition]
 ) -> tuple[list[Bout], list[PosturalTransition], list[TransitionCandidate]]:
-    """Walking begins after rising and ends before sitting down; a transition amidst walking is none."""
+    """Start walking after rising and end it before sitting down; drop transitions in the middle of
+    walking.
+    """
     kept, refused = [], []
     ranges = {i: [w.start_s, w.end_s] for i, w in enumerate(walks)}
     starts = np.array([w.start_s for w in walks])
@@ -273,7 +289,7 @@ def _meet(
 def _fix(
     parts: Sequence[DayPart], walks: Sequence[Bout], steps: Floats, kinds: np.ndarray
 ) -> list[FixedStretch]:
-    """What is certain, in order of time and without overlap; what comes first here wins."""
+    """Certain stretches in chronological order without overlap; earlier classes take precedence."""
     return _lay_by_rank(
         (
             [FixedStretch(a, b, "gap", "no_samples") for p in parts for a, b in p.gaps],
@@ -289,7 +305,7 @@ def _fix(
 
 
 def _lay_by_rank(classes: Sequence[Sequence[FixedStretch]]) -> list[FixedStretch]:
-    """Stretches in order of time; where two overlap, that of the earlier class stays."""
+    """Stretches in chronological order; of two that overlap, the one of the earlier class is kept."""
     laid: list[FixedStretch] = []
     for stretches in classes:
         starts = [x.start_s for x in laid]
@@ -309,7 +325,7 @@ def _lay_by_rank(classes: Sequence[Sequence[FixedStretch]]) -> list[FixedStretch
 
 
 def _cut_stairs(walk: Bout, steps: Floats, kinds: np.ndarray) -> list[FixedStretch]:
-    """A bout cut where its steps change between level and stairs."""
+    """Split a bout where its steps change between level walking and stairs."""
     own = _within(steps, walk.start_s, walk.end_s)
     steps, kinds = steps[own], kinds[own]
     if not len(steps):
@@ -324,7 +340,7 @@ def _cut_stairs(walk: Bout, steps: Floats, kinds: np.ndarray) -> list[FixedStret
 
 
 def _within(steps: Floats, start_s: float, end_s: float) -> slice:
-    """Steps from one time to another, both included."""
+    """Steps between two times, both included."""
     return slice(int(np.searchsorted(steps, start_s)), int(np.searchsorted(steps, end_s, "right")))
 
 
@@ -343,7 +359,7 @@ def _describe(walk: Bout, steps: Floats, kinds: np.ndarray) -> ActivityBout:
 
 
 def _merge_windows(windows: Sequence[Window]) -> list[Window]:
-    """Windows that touch become one."""
+    """Merge adjacent windows."""
     merged: list[Window] = []
     for a, b in sorted(windows):
         if merged and a <= merged[-1][1] + 1e-6:
@@ -354,14 +370,17 @@ def _merge_windows(windows: Sequence[Window]) -> list[Window]:
 
 
 def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -> tuple[Notice, ...]:
-    """What the reader has to know."""
+    """Notices for the reader."""
     told = list(stream.notices)
     if height_m is None:
         told.append(
             Notice(
                 "height_assumed",
-                f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. It decides how far a chest "
-                "must rise for getting up.",
+                Message(
+                    "Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. It decides how far a "
+                    "chest must rise for getting up.",
+                    NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
+                ),
                 severity="info",
             )
         )

@@ -1,4 +1,4 @@
-"""Parameters of daily life: the mean of the days that were worn long enough."""
+"""Daily-life parameters: means over the days with sufficient wear time."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ WORN_H: Final = 10.0
 
 
 def measure_day(found: ActivityResult) -> tuple[Parameter, ...]:
-    """Steps, times and rises of a day; without a day worn long enough the reason `no_whole_day`."""
+    """Steps, times and transitions per day; without a day of sufficient wear time the reason is
+    `no_whole_day`.
+    """
     days = [d for d in found.days if d.worn_h >= WORN_H]
     values = _measure(days)
     return tuple(

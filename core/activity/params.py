@@ -1,4 +1,4 @@
-"""Limits of the monitor of daily life and where they are from (docs/science/activity.md, "Parameters")."""
+"""Thresholds of the daily-life monitor and their sources (docs/science/activity.md, "Parameters")."""
 
 from __future__ import annotations
 
@@ -15,18 +15,21 @@ THIGH_SHARE: Final = 0.245
 
 @dataclass(frozen=True)
 class WearParams:
-    """When a sensor is taken to be off.
+    """Criteria for sensor non-wear.
 
     Parameters
     ----------
-    still_min : shortest such stretch, min. sd, axes : standard deviation within every minute below this,
-        m/s², on so many axes (van Hees et al. 2013, doi:10.1371/journal.pone.0061691: 13 mg, two of three
+    still_min : shortest period of non-wear, min. sd, axes : limit of the standard deviation within each
+    minute, m/s², and the number of axes below it (van Hees et al. 2013, doi:10.1371/journal.pone.0061691: 13
+    mg, two of three
         axes).
-    wobble : a worn trunk breathes: standard deviation of the means over 1 s within a minute below this, m/s²,
-        on every axis. Our choice: 2 mg; breathing tilts the chest of the simulated sleepers by 0.5 to 1.5°.
-    unmoved : spread of |acc| over 1 s, m/s², with which such a stretch goes on to the second. Our choice.
-    gap_s : longer holes are told as gaps, those of up to
-        sagittal.core.timeline's max_gap_s are filled. Our choice.
+    wobble : breathing moves a sensor on the trunk: limit of the standard deviation of 1-s means within a
+    minute, m/s², on every axis. Our choice: 2 mg; breathing tilts the chest of simulated sleepers by 0.5 to
+    1.5°.
+    unmoved : spread of |acc| over 1 s, m/s², below which such a period is extended second by second. Our
+    choice.
+    gap_s : longer interruptions are reported as gaps; those up to max_gap_s of sagittal.core.timeline are
+    filled. Our choice.
     """
 
     still_min: int = 30
@@ -39,15 +42,15 @@ class WearParams:
 
 @dataclass(frozen=True)
 class UprightParams:
-    """How the upright trunk is found.
+    """Estimation of the upright trunk orientation.
 
     Parameters
     ----------
-    walked_s : least walking of a wear period that tells it. still_s, still : else the first rest of this
-        length with |acc| spread below `still` m/s². Our choice but for the 5 s.
-    lean_rad, lean_s : leans of at least this much that come and go within this time show forward. least : of
-        them, agreement : length of their mean direction, 0 to 1. Our choice: people bow forward, hardly ever
-        sideways or backward.
+    walked_s : minimum walking time in a wear period to estimate it. still_s, still : otherwise the first rest
+    of this length with |acc| spread below `still` m/s². Our choice except for the 5 s.
+    lean_rad, lean_s : leans of at least this amplitude that start and end within this time reveal the forward
+    direction. least : their minimum number. agreement : minimum length of their mean direction, 0 to 1. Our
+    choice: people lean forward, hardly ever sideways or backward.
     """
 
     walked_s: float = 4.0
@@ -61,20 +64,20 @@ class UprightParams:
 
 @dataclass(frozen=True)
 class TransitionParams:
-    """Postural transitions.
+    """Detection of postural transitions.
 
     Parameters
     ----------
-    lying_rad : inclination beyond which nobody is who does not lie (thesis 7.2.4). still_s, still : lying
-        holds still at least so long, spread of |acc| below `still` m/s². shortest_lie_s : our choice.
-    lean_rad : least lean of rising and sitting down (thesis 7.2.5). prominence_rad : of its peak [our
-        choice].
-    candidate_rad : least lean that is told as a candidate [our choice]. half_s : a lean reaches at most so
-        far to either side of its peak. near_lying_s : leans this close to lying belong to it.
-    calm_s, calm_inside_s : the rise is measured between the calmest moments so near to the ends of a lean,
-        outside and inside [our choice].
-    rise_share : the chest rises or falls by at least this share of the thigh (thesis 7.2.5).
-    thigh_share : thigh by body height (Winter).
+    lying_rad : inclination exceeded only when lying (thesis 7.2.4). still_s, still : lying includes at least
+    this time with |acc| spread below `still` m/s². shortest_lie_s : our choice.
+    lean_rad : minimum lean of rising and sitting down (thesis 7.2.5). prominence_rad : of its peak [our
+    choice].
+    candidate_rad : minimum lean reported as a candidate [our choice]. half_s : a lean extends at most this
+    far to either side of its peak. near_lying_s : leans this close to lying are part of it.
+    calm_s, calm_inside_s : the rise is measured between the calmest moments within these distances of the
+    ends of a lean, outside and inside [our choice].
+    rise_share : the chest rises or falls by at least this fraction of the thigh length (thesis 7.2.5).
+    thigh_share : thigh length over body height (Winter).
     """
 
     lying_rad: float = 1.2217
@@ -94,15 +97,15 @@ class TransitionParams:
 
 @dataclass(frozen=True)
 class StairParams:
-    """Stairs, experimental: one set for everybody until it is calibrated (`calibrate_stairs`).
+    """Stair detection, experimental: generic thresholds unless calibrated (`calibrate_stairs`).
 
     Parameters
     ----------
-    rocks_rad, lean_rad : stairs go up where the inclination has at least this standard deviation and differs
-        in its mean by so much from the own level walking. down_rocks_rad : they go down where it has this
-        standard deviation. window_s : walking is judged in windows of this length; a shorter walk is level.
-    A guess: above what level walking with turns has in three recordings, so that stairs are rather missed
-    than invented (docs/science/activity.md, "Stairs").
+    rocks_rad, lean_rad : ascent: the inclination has at least this standard deviation and its mean differs by
+    this much from the person's level walking. down_rocks_rad : descent: minimum standard deviation.
+    window_s : length of the classification windows; a shorter walk is level. A guess: above the values of
+    level walking with turns in three recordings, favouring missed stairs over false detections
+    (docs/science/activity.md, "Stairs").
     """
 
     rocks_rad: float = 0.03
@@ -113,14 +116,14 @@ class StairParams:
 
 @dataclass(frozen=True)
 class ActivityParams:
-    """Of everything the monitor does.
+    """All parameters of the daily-life monitor.
 
     Parameters
     ----------
-    min_rate_hz : below, steps cannot be told. upright_rad : no steps beyond this inclination.
-    longest_stand_s : standing without a step lasts no longer: beyond, the posture is unknown. Our choice.
-    slab_s, margin_s : signals are filtered slab by slab with a margin on both sides, and postures
-        decided day by day; results do not depend on how a file is cut, but on these.
+    min_rate_hz : minimum rate for step detection. upright_rad : no steps above this inclination.
+    longest_stand_s : longest standing without a step; after that the posture is unknown. Our choice.
+    slab_s, margin_s : signals are filtered in slabs with a margin on both sides, and postures are decided day
+    by day; results depend on these lengths, but not on how a file is split into blocks.
     """
 
     min_rate_hz: float = 20.0

@@ -1,9 +1,9 @@
-"""What was done from when to when: postures between what is certain (docs/science/activity.md, "Postures").
+"""Posture classification between certain stretches (docs/science/activity.md, "Postures").
 
-Certain are lying, walking, and transitions. A stretch between two of them is sitting or standing by what both
-ends say of it: after rising one stands, before sitting down too, before and after walking, beside lying one
-sits. Where the two ends contradict each other, a candidate that lacks nothing but the lean may settle it;
-else nobody knows, and the transition that came in the wrong posture is marked.
+Lying, walking and transitions are certain. A stretch between two of them is sitting or standing, as implied
+by both ends: standing after rising, before sitting down, and before and after walking; sitting next to lying.
+If the two ends contradict each other, a candidate transition that only lacks lean amplitude may resolve the
+conflict; otherwise the posture is unknown, and a transition from the wrong posture is marked inconsistent.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ CONFIDENCE: Final[Mapping[Evidence, float]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class FixedStretch:
-    """A stretch of which it is certain what it is."""
+    """A stretch with a certain activity."""
 
     start_s: float
     end_s: float
@@ -61,12 +61,13 @@ def decide_postures(
     candidates: Sequence[TransitionCandidate],
     longest_stand_s: float,
 ) -> tuple[tuple[ActivitySpan, ...], tuple[PosturalTransition, ...]]:
-    """The whole time from 0 to `duration_s` in spans, and the transitions with their consistency.
+    """Divide the time from 0 to `duration_s` into spans, and check the transitions for consistency.
 
     Parameters
     ----------
-    fixed : in order of time, none overlapping. tilted : beyond the limit of lying without being still.
-    candidates : of these only those that lack nothing but the lean, or were close to lying, settle anything.
+    fixed : in chronological order, not overlapping. tilted : inclined past the lying limit without being
+    still.
+    candidates : only those rejected for too small a lean or for being close to lying are used.
     """
     spans: list[ActivitySpan] = []
     judged: list[PosturalTransition] = []
@@ -96,7 +97,9 @@ def _fill(
     longest_stand_s: float,
     judged: list[PosturalTransition],
 ) -> list[ActivitySpan]:
-    """Spans between two certain stretches with the transitions in between; appends these to `judged`."""
+    """Spans between two certain stretches, given the transitions in between, which are appended to
+    `judged`.
+    """
     if end <= start:
         judged += inside
         return []
@@ -134,7 +137,7 @@ def _beside(stretch: FixedStretch | None) -> Upright | None:
 
 
 def _stand(a: float, b: float, kind: Upright, evidence: Evidence, longest_s: float) -> ActivitySpan:
-    """Sitting or standing; standing for too long without a step is neither."""
+    """Sitting or standing; standing for too long without a step becomes unknown."""
     if kind == "standing" and b - a > longest_s:
         return _span(a, b, "unknown", "too_long_still")
     return _span(a, b, kind, evidence)
@@ -145,7 +148,7 @@ def _span(a: float, b: float, kind: ActivityKind, evidence: Evidence) -> Activit
 
 
 def _overlay(spans: Sequence[ActivitySpan], tilted: Sequence[Window]) -> list[ActivitySpan]:
-    """Spans with the stretches cut out in which the trunk was beyond lying for a moment."""
+    """Spans with brief inclinations past the lying limit replaced by unknown."""
     out: list[ActivitySpan] = []
     ends = [w[1] for w in tilted]
     for span in spans:
@@ -165,7 +168,7 @@ def _overlay(spans: Sequence[ActivitySpan], tilted: Sequence[Window]) -> list[Ac
 
 
 def _merge(spans: Sequence[ActivitySpan]) -> list[ActivitySpan]:
-    """Neighbours that say the same become one."""
+    """Merge adjacent spans of equal kind."""
     merged: list[ActivitySpan] = []
     for span in spans:
         last = merged[-1] if merged else None

@@ -1,8 +1,8 @@
-"""Samples → ten frames a second: low-passed gravity, vertical acceleration, stillness, steps and turns.
+"""Samples → ten frames per second: low-passed gravity, vertical acceleration, stillness, steps and turns.
 
-The recording is laid on a uniform axis (core/timeline/grid.py) and gone through in slabs of a fixed length,
-each with a margin on both sides, so that memory does not grow and nothing depends on how the blocks are cut.
-Equations: docs/science/activity.md, "Reduction".
+The recording is resampled to a uniform axis (core/timeline/grid.py) and processed in slabs of fixed length,
+each with a margin on both sides, so that memory use is bounded and results do not depend on the block
+boundaries. Equations: docs/science/activity.md, "Reduction".
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from sagittal.core.errors import SignalError
 from sagittal.core.events.lumbar import StepTimeParams, find_moving, find_step_times, split_about_vertical
 from sagittal.core.events.turns import Turn, find_turns
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals, Subject, UniformRecording
 from sagittal.core.signals.rest import find_runs
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock, find_complete_rows
@@ -62,16 +63,16 @@ LONGEST_S: Final = 60 * 86400.0
 
 
 def working_rate(rate_hz: float) -> int:
-    """Rate of the uniform axis: the next that a frame holds a whole number of samples of."""
+    """Rate of the uniform axis: the next one with a whole number of samples per frame."""
     return FRAME_HZ * max(2, ceil(rate_hz / FRAME_HZ - 0.01))
 
 
 def reduce_stream(stream: LongStream, segment: Segment, params: ActivityParams) -> Iterator[Slab]:
-    """Go through a recording slab by slab.
+    """Reduce a recording slab by slab.
 
     Raises
     ------
-    SignalError : `bad_signal` without one complete sample, `clock_jump`.
+    SignalError : `bad_signal` without any complete sample, `clock_jump`.
     """
     rate = working_rate(stream.rate_hz)
     margin, size = params.margin_s * rate, params.slab_s * rate
@@ -89,7 +90,7 @@ def reduce_stream(stream: LongStream, segment: Segment, params: ActivityParams) 
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """Successive points of the axis from `first` on."""
+    """Consecutive points of the axis starting at `first`."""
 
     first: int
     acc: Floats
@@ -98,7 +99,7 @@ class _Window:
 
 
 class _PointStore:
-    """The points of a slab and its margins, in arrays that are made once."""
+    """Preallocated arrays for the points of a slab and its margins."""
 
     def __init__(self, room: int) -> None:
         self._points = _Window(0, np.empty((room, 3)), np.empty((room, 3)), np.empty(room, np.bool_))
@@ -130,7 +131,7 @@ class _PointStore:
 def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
     """Pieces of the axis of `PIECE_S` each; the last ends with the recording.
 
-    Points of a piece depend on the last sample before it, those in it, and the first behind it.
+    The points of a piece depend on the last sample before it, those in it, and the first one after it.
     """
     kept: list[SampleBlock] = []
     first, last_s, seen = 0, -np.inf, False
@@ -143,8 +144,13 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
         if float(block.t_s[-1]) > LONGEST_S:
             raise SignalError(
                 "clock_jump",
-                f"The clock of “{stream.source}” runs over {block.t_s[-1] / 86400:.0f} days; at most "
-                f"{LONGEST_S / 86400:.0f} are read. Export the recording again.",
+                Message(
+                    "The clock of “{source}” runs over {t_s:.0f} days; at most {LONGEST_S:.0f} are "
+                    "read. Export the recording again.",
+                    source=stream.source,
+                    t_s=block.t_s[-1] / 86400,
+                    LONGEST_S=LONGEST_S / 86400,
+                ),
                 sensor=stream.device_id,
             )
         seen, last_s = True, float(block.t_s[-1])
@@ -159,7 +165,7 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
     if not seen:
         raise SignalError(
             "bad_signal",
-            f"“{stream.source}” has no complete sample; export it again.",
+            Message("“{source}” has no complete sample; export it again.", source=stream.source),
             sensor=stream.device_id,
         )
     until = floor(last_s * rate + 0.01) + 1
@@ -180,7 +186,7 @@ def _lay(rows: SampleBlock, first: int, end: int, rate: int, stream: LongStream)
 
 
 def _in_order(block: SampleBlock, after_s: float) -> SampleBlock:
-    """Rows whose time is later than all before them."""
+    """Rows with a time later than all previous ones."""
     if not len(block.t_s):
         return block
     before = np.maximum.accumulate(np.concatenate(([after_s], block.t_s[:-1])))
@@ -205,7 +211,7 @@ def _join(blocks: Sequence[SampleBlock]) -> SampleBlock:
 
 @lru_cache(maxsize=16)
 def _design_gravity_filter(rate_hz: int) -> Floats:
-    """Second-order section (1, 6) of the thesis' low-pass."""
+    """Second-order section (1, 6) of the low-pass filter of the thesis."""
     from scipy.signal import ellip
 
     return np.asarray(ellip(2, RIPPLE_DB, STOP_DB, PASS_HZ / (0.5 * rate_hz), output="sos"))
@@ -214,7 +220,7 @@ def _design_gravity_filter(rate_hz: int) -> Floats:
 def _reduce(
     window: _Window, start: int, end: int, rate: int, segment: Segment, params: ActivityParams
 ) -> Slab:
-    """One slab: points start to end of a window that has margins around them."""
+    """Reduce one slab: points start to end of a window that includes margins."""
     core = slice(start - window.first, end - window.first)
     if not window.valid[core].any():
         return Slab(_empty_frames(start // (rate // FRAME_HZ), (end - start) // (rate // FRAME_HZ)), (), ())
@@ -225,7 +231,7 @@ def _reduce(
 
 
 def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams) -> tuple[Frames, Bools]:
-    """Frames of the points `core` of a window, and where all of its points (n,) move."""
+    """Frames of the points `core` of a window, and a movement mask (n,) of all its points."""
     from scipy.ndimage import uniform_filter1d
     from scipy.signal import sosfiltfilt
 
@@ -252,9 +258,10 @@ def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _add_up(acc, gyr, bias, start, dt, keep_s, gate, way, up):  # type: ignore[no-untyped-def]
-    """Add up, in sensor axes, turned by the rates and drawn towards the specific force, to `up` (n, 3).
+    """Integrate the up direction in sensor axes from the rates, corrected towards the specific force, into
+    `up` (n, 3).
 
-    way : 1 from the first sample on, −1 from the last one back.
+    way : 1 forwards from the first sample, −1 backwards from the last one.
     """
     x, y, z = start[0], start[1], start[2]
     for i in range(len(acc)):
@@ -280,11 +287,12 @@ def _add_up(acc, gyr, bias, start, dt, keep_s, gate, way, up):  # type: ignore[n
 
 
 def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Floats:
-    """Up (n, 3) in sensor axes of a sensor with a gyroscope: forwards and backwards through time, the mean.
+    """Up direction (n, 3) in axes of a sensor with gyroscope: mean of a forward and a backward pass.
 
     Parameters
     ----------
-    coarse : (n, 3) the same without a gyroscope, to start from. The gyroscope's bias is its mean while quiet.
+    coarse : (n, 3) estimate without gyroscope, used for initialisation. The gyroscope bias is its mean during
+    stillness.
     """
     quiet = np.linalg.norm(gyr, axis=1) < QUIET
     bias = gyr[quiet].mean(axis=0) if quiet.any() else np.zeros(3)
@@ -296,7 +304,7 @@ def follow_up(acc: Floats, gyr: Floats, coarse: Floats, rate_hz: float) -> Float
 
 
 def _empty_frames(first: int, count: int) -> Frames:
-    """Frames of which nothing was measured."""
+    """Frames without measurements."""
     minutes = np.full((ceil(count / PER_MINUTE), 3), np.nan, np.float32)
     nothing = np.zeros(count, np.float32)
     gravity = np.zeros((count, 3), np.float32)
@@ -304,13 +312,13 @@ def _empty_frames(first: int, count: int) -> Frames:
 
 
 def _cut(x: Samples, per: int) -> Samples:
-    """Whole frames (f, per, …) of samples (n, …); what is left at the end falls away."""
+    """Whole frames (f, per, …) of samples (n, …); an incomplete last frame is dropped."""
     count = len(x) // per
     return x[: count * per].reshape(count, per, *x.shape[1:])
 
 
 def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Singles, Singles]:
-    """Standard deviation (m, 3) of samples and of their means over 1 s in every minute begun."""
+    """Standard deviation (m, 3) of samples and of their 1-s means for every minute begun."""
     minute = 60 * rate
     sd, wobble = [], []
     for i in range(0, len(acc), minute):
@@ -327,7 +335,7 @@ def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Singles, Sin
 def _find_steps_and_turns(
     window: _Window, moving: Bools, rate: int, segment: Segment, params: ActivityParams
 ) -> tuple[list[float], list[Turn]]:
-    """Steps of every stretch of movement of a window, and the turns of those in which somebody walks."""
+    """Steps in every moving stretch of a window, and the turns during walking."""
     signals = SensorSignals("", window.acc, window.gyr, None, window.valid, ~window.valid)
     steps: list[float] = []
     turns: list[Turn] = []
@@ -350,7 +358,7 @@ def _find_steps_and_turns(
 
 
 def _stretches(moving: Bools, rate: int, params: StepTimeParams) -> list[tuple[int, int]]:
-    """Runs of movement long enough for a bout of steps, those with short pauses joined."""
+    """Runs of movement long enough for a bout of steps, with short pauses bridged."""
     joined: list[tuple[int, int]] = []
     for a, b in find_runs(moving):
         if joined and a - joined[-1][1] < JOIN_S * rate:
@@ -367,11 +375,11 @@ def _cut_out(signals: SensorSignals, part: slice) -> SensorSignals:
 
 
 def _take_alone(signals: SensorSignals, rate: int, thin: int, segment: Segment) -> UniformRecording:
-    """A stretch by its accelerometer alone: with and without a gyroscope the steps are the same.
+    """A stretch with its accelerometer only, so that steps are the same with and without a gyroscope.
 
     Parameters
     ----------
-    thin : so many samples become their mean.
+    thin : number of samples averaged into one.
     """
     acc = np.asarray(_cut(signals.acc, thin).mean(axis=1))
     valid = np.asarray(_cut(signals.valid, thin).all(axis=1), np.bool_)

@@ -1,20 +1,20 @@
-"""What the monitor of daily life says about a recording of hours to days (docs/science/activity.md).
+"""Result of daily-life monitoring over hours to days (docs/science/activity.md).
 
-All times are seconds from the recording's first sample; `started_at` is the device's own clock there, where
-its file has one. Angles are degrees, trunk inclination is positive forward. What is not known is None and
-has its reason.
+All times are seconds from the recording's first sample; `started_at` is the device's own clock there, if its
+file has one. Angles are in degrees, trunk inclination is positive forward. Unknown values are None with a
+reason.
 
-ActivityResult     everything below, and what it was made from
-ActivitySpan       the day from end to end: what the person did from when to when; spans touch, none overlap
-PosturalTransition rising, sitting down, lying down, getting up: those that count
-TransitionCandidate a lean of the trunk that was looked at and does not count, with why
+ActivityResult     the complete result and its inputs
+ActivitySpan       an activity with start and end; spans cover the whole time without gaps or overlap
+PosturalTransition an accepted rising, sitting down, lying down or getting up
+TransitionCandidate a rejected lean of the trunk, with the reason
 ActivityBout       walking without a long break: level, up or down stairs, with its steps
-ActivityHour       steps and minutes of each kind in one hour of the clock (or of the recording)
-ActivityDay        the same in one day, and how much of it can be judged
-WearPeriod         how the sensor sat while it was worn: its up and forward axes, and how they were found
-inclination_deg    once a second: signed lean of the trunk, NaN where it was not worn or forward is unknown
+ActivityHour       steps and minutes of each kind in one clock hour (or hour of the recording)
+ActivityDay        the same for one day, and its wear time
+WearPeriod         a period of wear with the sensor's up and forward axes, and how they were estimated
+inclination_deg    signed trunk lean once per second, NaN if not worn or forward is unknown
 
-The files they become: server/report/files/activity_files.py.
+Exported files: server/report/files/activity_files.py.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ down."""
 
 @dataclass(frozen=True)
 class ActivitySpan:
-    """One stretch of the day, half-open [start_s, end_s).
+    """One activity span, half-open [start_s, end_s).
 
     Parameters
     ----------
-    confidence : 1 both ends agree or steps were seen, 0.8 lying, 0.7 one end says so, 0.5 by a candidate
-        below the limit; None where the kind is unknown, non_wear or gap. An order, not a probability.
-    evidence : what it rests on, or why nothing is known.
+    confidence : 1 both ends agree or steps were detected, 0.8 lying, 0.7 evidence from one end only, 0.5 from
+    a candidate below the limit; None for unknown, non_wear and gap. A rank, not a probability.
+    evidence : evidence for the kind, or the reason why it is unknown.
     """
 
     start_s: float
@@ -83,14 +83,14 @@ class ActivitySpan:
 
 @dataclass(frozen=True)
 class PosturalTransition:
-    """A change of posture that counts.
+    """An accepted change of posture.
 
     Parameters
     ----------
-    time_s : largest lean, or for lying when the trunk is half way. start_s, end_s : of the
-        lean.
-    lean_deg : its largest inclination from upright. rise_m : of the chest, positive up; None for lying.
-    consistent : False where the posture before it cannot be the one that it starts from.
+    time_s : time of the largest lean, or for lying of half the inclination. start_s, end_s : of the lean.
+    lean_deg : largest inclination from upright. rise_m : vertical displacement of the chest, up positive;
+    None for lying.
+    consistent : False if the preceding posture cannot be its starting posture.
     """
 
     kind: TransitionKind
@@ -104,11 +104,11 @@ class PosturalTransition:
 
 @dataclass(frozen=True)
 class TransitionCandidate:
-    """A lean that does not count; a person may look at it.
+    """A rejected lean, kept for manual review.
 
     Parameters
     ----------
-    likely : what it would have been, None where the direction is not clear.
+    likely : the transition it most resembles, None if the direction is unclear.
     """
 
     time_s: float
@@ -126,7 +126,8 @@ class ActivityBout:
 
     Parameters
     ----------
-    kind : of most of its steps. steps : counted. stairs_up_steps, stairs_down_steps : those of its parts on
+    kind : of the majority of its steps. steps : number of steps. stairs_up_steps, stairs_down_steps : number
+    on
         stairs. cadence_spm : steps per minute.
     """
 
@@ -146,7 +147,7 @@ class ActivityBout:
 
 @dataclass(frozen=True)
 class ActivityHour:
-    """One hour. minutes : kind → min; they add up to its length. steps : counted."""
+    """One hour. minutes : kind → min; they add up to its length. steps : number of steps."""
 
     start_s: float
     end_s: float
@@ -156,12 +157,12 @@ class ActivityHour:
 
 @dataclass(frozen=True)
 class ActivityDay:
-    """One day of the clock, or 24 hours from the start where the file has no clock.
+    """One calendar day, or 24 hours from the start if the file has no clock.
 
     Parameters
     ----------
-    date : of the device's clock, None without one. worn_h : neither non_wear nor gap.
-    minutes : kind → min. transitions : kind → number. bouts : number of walking bouts.
+    date : by the device's clock, None without one. worn_h : time that is neither non_wear nor gap.
+    minutes : kind → min. transitions : kind → count. bouts : number of walking bouts.
     """
 
     date: dt.date | None
@@ -182,13 +183,13 @@ unknown."""
 
 @dataclass(frozen=True)
 class WearPeriod:
-    """From putting on to taking off, half-open.
+    """Half-open period between donning and doffing the sensor.
 
     Parameters
     ----------
-    up : unit axis of the sensor that points up in an upright person, None = not known. forward : that points
-        forward, None where no lean showed it. method : how up was found. leans : how many leans showed
-        forward.
+    up : unit axis of the sensor that points up in an upright person, None = unknown. forward : unit axis that
+    points forward, None without suitable leans. method : how up was estimated. leans : number of leans used
+    for forward.
     """
 
     start_s: float
@@ -201,16 +202,15 @@ class WearPeriod:
 
 @dataclass(frozen=True, eq=False)
 class ActivityResult:
-    """Everything the monitor found.
+    """Complete result of the daily-life monitor.
 
     Parameters
     ----------
-    segment : where the sensor was worn, "chest" or "pelvis". device_id, source : which sensor, of which file.
-    rate_hz : its nominal rate. has_gyro : its gyroscope was used (turns need it).
-    duration_s : from first to last sample. height_m : taken for the thigh length.
-    steps_s : (n,) time of every step. inclination_deg : (seconds,) mean of every whole second, NaN = not
-        known.
-    turns : while walking; empty without a gyroscope.
+    segment : sensor placement, "chest" or "pelvis". device_id, source : the sensor and its file.
+    rate_hz : its nominal rate. has_gyro : the gyroscope was used (required for turns).
+    duration_s : from first to last sample. height_m : used for the thigh length.
+    steps_s : (n,) time of every step. inclination_deg : (seconds,) mean of every full second, NaN = unknown.
+    turns : turns while walking; empty without a gyroscope.
     """
 
     segment: Segment
@@ -234,10 +234,10 @@ class ActivityResult:
     notices: tuple[Notice, ...] = field(default=())
 
     def minutes(self, kind: ActivityKind) -> float:
-        """Minutes of one kind in the whole recording."""
+        """Minutes of one activity in the whole recording."""
         return sum(s.duration_s for s in self.spans if s.kind == kind) / 60.0
 
     @property
     def sub_threshold(self) -> tuple[TransitionCandidate, ...]:
-        """Candidates that lack nothing but the lean."""
+        """Candidates rejected only for too small a lean."""
         return tuple(c for c in self.candidates if c.refused == "lean_below_limit")

@@ -1,7 +1,7 @@
-"""Stairs among walking, experimental (docs/science/activity.md, "Stairs"; Nazarahari 2021, 7.2.6).
+"""Stair detection during walking, experimental (docs/science/activity.md, "Stairs"; Nazarahari 2021, 7.2.6).
 
-On stairs the trunk leans more, and more unevenly, than in level walking: it rocks. The thesis takes the
-variance of the low-passed vertical acceleration, in which the bounce of the steps outweighs the inclination.
+On stairs the trunk leans more, and more variably, than in level walking. The thesis uses the variance of the
+low-passed vertical acceleration, in which the bounce of the steps outweighs the inclination.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sagittal.core.activity.frames import FRAME_HZ, Singles
 from sagittal.core.activity.params import StairParams
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.signals.rest import find_runs
 
 StepKind = Literal["walking", "stairs_up", "stairs_down"]
@@ -31,7 +32,7 @@ KIND_OF: tuple[StepKind, ...] = ("walking", "stairs_up", "stairs_down")
 def measure_walking(
     theta: Singles, walking: Bools, at: Sequence[int], params: StairParams
 ) -> tuple[Floats, Floats]:
-    """Standard deviation and mean of the inclination, rad, around frames.
+    """Standard deviation and mean of the inclination, rad, around the given frames.
 
     Parameters
     ----------
@@ -39,7 +40,7 @@ def measure_walking(
 
     Returns
     -------
-    (steps,) each; NaN where the walk is too short for them. Where walking begins and ends nothing is taken.
+    (steps,) each; NaN if the walk is too short. The start and end of walking are excluded.
     """
     from scipy.ndimage import uniform_filter1d
 
@@ -62,7 +63,7 @@ def measure_walking(
 
 
 def tell_stairs(rocks: Floats, lean: Floats, params: StairParams) -> np.ndarray:
-    """0 level, 1 up, 2 down (steps,), smoothed over five steps; what is not known is level."""
+    """Classify steps (steps,) as 0 level, 1 up or 2 down, smoothed over five steps; unknown ones as level."""
     up = (rocks > params.rocks_rad) & (lean > params.lean_rad)
     kinds = np.where(up, UP, np.where(rocks > params.down_rocks_rad, DOWN, LEVEL))
     if len(kinds) < 5:
@@ -78,15 +79,16 @@ def calibrate_stairs(
     down: tuple[Floats, Floats],
     params: StairParams | None = None,
 ) -> StairParams:
-    """A person's own limits: halfway between level walking and stairs as they walked them once.
+    """Personal thresholds: halfway between a person's level walking and stairs in one recording.
 
     Parameters
     ----------
-    level, up, down : rocking and inclination (n,) each, of `measure_walking`, of steps known to be such.
+    level, up, down : inclination sd and mean (n,) each, from `measure_walking`, of steps of known kind.
 
     Raises
     ------
-    ParameterError : `stairs_not_told_apart` where the person's stairs are like their level walking.
+    ParameterError : `stairs_not_told_apart` if the person's stair walking cannot be distinguished from level
+    walking.
     """
     (flat, ahead), (climbs, leans), (descends, _) = (
         (float(np.nanmedian(rocks)), float(np.nanmedian(lean))) for rocks, lean in (level, up, down)
@@ -94,9 +96,14 @@ def calibrate_stairs(
     if min(climbs, descends) <= flat or leans <= ahead:
         raise ParameterError(
             "stairs_not_told_apart",
-            f"The trunk rocks by {np.degrees(flat):.1f}° level, {np.degrees(climbs):.1f}° up and "
-            f"{np.degrees(descends):.1f}° down, and leans {np.degrees(leans - ahead):.1f}° further going up. "
-            "Expected more on stairs.",
+            Message(
+                "The trunk rocks by {flat:.1f}° level, {climbs:.1f}° up and {descends:.1f}° down, "
+                "and leans {degrees:.1f}° further going up. Expected more on stairs.",
+                flat=np.degrees(flat),
+                climbs=np.degrees(climbs),
+                descends=np.degrees(descends),
+                degrees=np.degrees(leans - ahead),
+            ),
         )
     return replace(
         params or StairParams(),

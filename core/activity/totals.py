@@ -1,4 +1,4 @@
-"""Sums of a recording of daily life by hours and days, of the device's clock where it has one."""
+"""Hourly and daily totals of a daily-life recording, by the device's clock if available."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DAY_S: Final = 86400.0
 def sum_hours(
     duration_s: float, started_at: dt.datetime | None, spans: Sequence[ActivitySpan], steps_s: Floats
 ) -> tuple[ActivityHour, ...]:
-    """Steps and minutes of every hour that the recording touches."""
+    """Steps and minutes for every hour that the recording overlaps."""
     edges = _edges(duration_s, HOUR_S, _since(started_at, HOUR_S))
     minutes = _minutes(edges, spans)
     counts = np.histogram(steps_s, edges)[0]
@@ -46,7 +46,7 @@ def sum_days(
     bouts: Sequence[ActivityBout],
     transitions: Sequence[PosturalTransition],
 ) -> tuple[ActivityDay, ...]:
-    """The same of every day, from midnight to midnight, or of 24 h without a clock."""
+    """Steps and minutes for every day, from midnight to midnight, or of 24 h without a clock."""
     edges = _edges(duration_s, DAY_S, _since(started_at, DAY_S))
     minutes = _minutes(edges, spans)
     counts = np.histogram(steps_s, edges)[0]

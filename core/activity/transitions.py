@@ -1,5 +1,6 @@
-"""Leans of the trunk and what they are: rising, sitting down, a bow; and when the person lay
-(docs/science/activity.md, "Transitions"; Nazarahari 2021, 7.2.4 and 7.2.5)."""
+"""Trunk leans and their classification as rising, sitting down or bowing; periods of lying
+(docs/science/activity.md, "Transitions"; Nazarahari 2021, 7.2.4 and 7.2.5).
+"""
 
 from __future__ import annotations
 
@@ -38,7 +39,9 @@ HALF_WAY = 3 * FRAME_HZ
 
 @dataclass(frozen=True)
 class Lying:
-    """Lying from half way down, frame a, to half way up, b; `still` where the person held still in it."""
+    """Lying between the midpoints of lying down (frame a) and getting up (frame b); `still` if it includes
+    stillness.
+    """
 
     a: int
     b: int
@@ -47,7 +50,7 @@ class Lying:
 
 @dataclass(frozen=True)
 class Lean:
-    """A lean: first frame, the frame of its largest inclination, last; its inclination there, rad."""
+    """A lean: first frame, frame of the largest inclination, last frame; largest inclination, rad."""
 
     a: int
     top: int
@@ -56,11 +59,11 @@ class Lean:
 
 
 def find_lying(tilt: Singles, frames: Frames, there: Bools, params: TransitionParams) -> list[Lying]:
-    """Stretches beyond the limit of lying.
+    """Periods with an inclination above the lying limit.
 
     Parameters
     ----------
-    tilt : (f,) inclination to any side, rad. there : (f,) worn and upright is known.
+    tilt : (f,) inclination in any direction, rad. there : (f,) sensor worn and upright direction known.
     """
     joined: list[tuple[int, int]] = []
     for a, b in find_runs((tilt > params.lying_rad) & there):
@@ -92,7 +95,7 @@ def find_lying(tilt: Singles, frames: Frames, there: Bools, params: TransitionPa
 
 
 def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
-    """Frames (n,) in lying or at most `close` frames away from it."""
+    """Frames (n,) in lying or within `close` frames of it."""
     mask = np.zeros(n, np.bool_)
     for x in lying:
         mask[max(0, x.a - close) : x.b + close + 1] = True
@@ -100,13 +103,13 @@ def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
 
 
 def _count_above(tilt: Singles, there: Bools, limit: float) -> int:
-    """Frames from the first one on that stay above a limit."""
+    """Number of frames, from the first one, that stay above a limit."""
     over = (tilt > limit) & there
     return len(over) if over.all() else int(np.argmin(over))
 
 
 def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[Lean]:
-    """Peaks of the inclination (f,) that are candidates, each with the minima beside it."""
+    """Peaks of the inclination (f,) as candidate leans, each with the adjacent minima."""
     least = 0.5 * params.prominence_rad
     foot = max(0.0, params.candidate_rad - least)
     tops: list[int] = []
@@ -129,7 +132,9 @@ def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[L
 
 
 def _edge(theta: Singles) -> int:
-    """How far from the peak, the first of them, the inclination (n,) has fallen before it rises again."""
+    """Distance from the peak, the first sample, to the minimum of the inclination (n,) before it rises
+    again.
+    """
     low = np.minimum.accumulate(theta)
     risen = np.flatnonzero(theta > low + EDGE_RISE)
     upto = int(risen[0]) if len(risen) else len(theta)
@@ -137,9 +142,9 @@ def _edge(theta: Singles) -> int:
 
 
 def find_calm_ends(lean: Lean, frames: Frames, params: TransitionParams) -> tuple[int, int]:
-    """Frames around a lean between which the chest goes up or down: the calmest near its two ends.
+    """Frames around a lean between which the chest moves up or down: the calmest ones near its two ends.
 
-    Where the trunk is upright again the body may still be stepping, or fall into the seat.
+    When the trunk becomes upright again the body may still be stepping, or dropping onto the seat.
     """
     around, inside = round(params.calm_s * FRAME_HZ), round(params.calm_inside_s * FRAME_HZ)
     n = len(frames.spread)
@@ -157,12 +162,12 @@ def find_calm_ends(lean: Lean, frames: Frames, params: TransitionParams) -> tupl
 
 
 def measure_rise(up: Floats) -> float:
-    """How far the chest rises over a lean, m (thesis Eq. 56).
+    """Vertical displacement of the chest over a lean, m (thesis Eq. 56).
 
     Parameters
     ----------
-    up : (n,) upward acceleration in frames; its mean is taken off, and with it the drift of the velocity:
-        the chest is still at both ends.
+    up : (n,) upward acceleration in frames; its mean is subtracted, which removes velocity drift because the
+    chest is still at both ends.
     """
     a = up - up.mean()
     velocity = np.concatenate(([0.0], np.cumsum(a))) / FRAME_HZ
@@ -170,8 +175,9 @@ def measure_rise(up: Floats) -> float:
 
 
 def tell_direction(size: Floats) -> float:
-    """Positive = rising, negative = sitting down: the greatest value that the running sum reaches of the
-    low-passed acceleration's length (n,) less gravity, m/s (thesis Eq. 57 and 7.2.5)."""
+    """Direction of a transition, positive = rising, negative = sitting down: the extreme of the running
+    sum of the low-passed acceleration norm (n,) minus gravity, m/s (thesis Eq. 57 and 7.2.5).
+    """
     a = size - GRAVITY
     running = np.cumsum(a - a.mean()) / FRAME_HZ
     return float(running[int(np.argmax(np.abs(running)))])
@@ -186,7 +192,7 @@ def judge_leans(
     thigh_m: float,
     params: TransitionParams,
 ) -> tuple[list[PosturalTransition], list[TransitionCandidate]]:
-    """Rising and sitting down among the leans; of the others those worth telling."""
+    """Classify leans as rising or sitting down; of the others keep those worth reporting as candidates."""
     found: list[PosturalTransition] = []
     refused: list[TransitionCandidate] = []
     close = round(params.near_lying_s * FRAME_HZ)
@@ -229,7 +235,7 @@ def judge_leans(
 
 
 def tell_lying(lying: Sequence[Lying], frames: Frames, tilt: Singles) -> list[PosturalTransition]:
-    """Lying down and getting up where a stretch of lying begins and ends, in the direction of the tilt."""
+    """Lying down and getting up at the ends of a lying period, with the direction of the tilt."""
     found = []
     n = len(frames.valid)
     for x in lying:

@@ -1,7 +1,7 @@
-"""When the sensor was worn, and how it sat: holes, stretches that nobody wears, and where up and forward are.
+"""Sensor wear and alignment: gaps, non-wear, and the upright and forward directions.
 
-Up is the mean direction of gravity while the person walks: nobody walks lying down. Forward is where the
-trunk leans when it leans for a moment (docs/science/activity.md, "Upright and forward").
+Up is the mean direction of gravity while walking, which excludes lying. Forward is the direction of brief
+trunk leans (docs/science/activity.md, "Upright and forward").
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Axis = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Wear:
-    """Frames by index: half-open ranges of holes, of non-wear, and between them what was worn."""
+    """Half-open frame ranges of gaps, of non-wear, and of wear between them."""
 
     gaps: tuple[tuple[int, int], ...]
     off: tuple[tuple[int, int], ...]
@@ -30,7 +30,7 @@ class Wear:
 
 
 def find_wear(frames: Frames, params: WearParams) -> Wear:
-    """Tell holes and non-wear of successive frames."""
+    """Detect gaps and non-wear in consecutive frames."""
     n = len(frames.valid)
     gaps = tuple((a, b) for a, b in find_runs(~frames.valid) if b - a >= params.gap_s * FRAME_HZ)
     quiet = np.zeros(n, np.bool_)
@@ -55,12 +55,12 @@ def find_wear(frames: Frames, params: WearParams) -> Wear:
 
 
 def _count_while(mask: Bools) -> int:
-    """How many entries are True before the first that is not."""
+    """Number of leading entries that are True."""
     return int(np.argmin(mask)) if len(mask) and not mask.all() else len(mask)
 
 
 def group_periods(wear: Wear, params: WearParams) -> tuple[tuple[int, int], ...]:
-    """Periods of wear: worn stretches with nothing longer than `still_min` between them."""
+    """Wear periods: stretches of wear separated by less than `still_min`."""
     periods: list[tuple[int, int]] = []
     for a, b in wear.worn:
         if periods and a - periods[-1][1] < params.still_min * PER_MINUTE:
@@ -73,7 +73,7 @@ def group_periods(wear: Wear, params: WearParams) -> tuple[tuple[int, int], ...]
 def find_upright(
     frames: Frames, walking: Bools, period: tuple[int, int], params: UprightParams
 ) -> tuple[Floats | None, UprightMethod]:
-    """Unit axis (3,) of the sensor that points up in the upright person of a period."""
+    """Unit axis (3,) of the sensor that points up while the person is upright, for one period."""
     part = slice(*period)
     walks = walking[part] & frames.valid[part]
     if np.count_nonzero(walks) >= params.walked_s * FRAME_HZ:
@@ -88,7 +88,7 @@ def find_upright(
 
 
 def _middle(gravity: Singles) -> Floats:
-    """Unit vector (3,) of the medians of directions (n, 3)."""
+    """Component-wise median direction (3,) of directions (n, 3), as a unit vector."""
     middle = np.median(gravity / measure_length(gravity)[:, None], axis=0)
     return np.asarray(middle / np.linalg.norm(middle))
 
@@ -96,11 +96,12 @@ def _middle(gravity: Singles) -> Floats:
 def find_forward(
     gravity: Singles, up: Floats, at: Sequence[tuple[int, int, int]], params: UprightParams
 ) -> tuple[Floats | None, int]:
-    """Unit axis (3,) of the sensor that points forward, across up, and how many leans showed it.
+    """Unit axis (3,) of the sensor that points forward, perpendicular to up, and the number of leans it is
+    based on.
 
     Parameters
     ----------
-    gravity : (f, 3). at : first, most and last frame of every lean of a moment.
+    gravity : (f, 3). at : first, peak and last frame of every brief lean.
     """
     directions = []
     for a, top, b in at:
@@ -121,7 +122,7 @@ def find_forward(
 def describe_period(
     start_s: float, end_s: float, up: Floats | None, forward: Floats | None, method: UprightMethod, leans: int
 ) -> WearPeriod:
-    """The period in words of the result."""
+    """Convert a period to its result type."""
     return WearPeriod(start_s, end_s, _axis(up), _axis(forward), method, leans)
 
 

@@ -1,4 +1,4 @@
-"""What sensors on neighbouring segments say about each other: clocks, labels, and whether one slipped."""
+"""Cross-checks between sensors on neighbouring segments: clock offsets, segment labels and sensor slip."""
 
 from sagittal.core.agreement.agree import Agreement, check_agreement
 from sagittal.core.agreement.params import AgreementParams

@@ -1,4 +1,4 @@
-"""What the sensors say about each other, and the recording with what could be repaired."""
+"""Consistency checks between sensors, and the recording with correctable errors corrected."""
 
 from __future__ import annotations
 
@@ -27,23 +27,23 @@ from sagittal.core.timeline import TimelineParams
 
 @dataclass(frozen=True, eq=False)
 class Agreement:
-    """What was found on a take, and what was made of it.
+    """Result of the consistency checks on a recording, and of the corrections.
 
     Parameters
     ----------
-    recording : what all that follows works on; its notices say what was found. The recording that was given
-        when there was nothing to say.
-    exchange : None where too few sensors are worn. lags, drifts : as found, also where they are too small to
-        be told. slips : all of them are told.
-    whole : the same with all that a slipped sensor measured, which `recording` leaves out; None where nothing
-        is left out.
-    shifted_s : sensor → lag that was taken out, at the middle of the take, s.
-    doubtful : sensor → stretch in which the angles beside it are not to be shown, s: around a slip that was
-        turned back, all of the take where the slip was before the walk, else from there on. Unless repair was
-        forbidden, a sensor that is not turned back is not valid there.
-    judged_clocks : sensors of which a lag would have been seen. judged_places : sensor → from when to when a
-        slip would have been, s.
-    misfits : joint → median misfit of its two sides over its windows, after what was repaired.
+    recording : corrected recording for all later stages, with notices. The input recording if nothing was
+        detected.
+    exchange : None with too few sensors. lags, drifts : all estimates, including those too small to be
+        reported. slips : all of them are reported.
+    whole : the same including the samples of a slipped sensor that `recording` excludes; None if none are
+        excluded.
+    shifted_s : sensor → corrected lag, at the middle of the recording, s.
+    doubtful : sensor → period in which the adjacent angles must not be shown, s: around a corrected slip; the
+        whole recording if the slip preceded the walk; otherwise from the slip on. Unless correction is
+        disabled, an uncorrected sensor is invalid in that period.
+    judged_clocks : sensors for which a lag would have been detected. judged_places : sensor → period in which
+        a slip would have been detected, s.
+    misfits : joint → median misfit of its two sides over its windows, after corrections.
     """
 
     recording: UniformRecording
@@ -69,13 +69,13 @@ def compare_sensors(
     unchanged: Iterable[JointWindows] = (),
     over_s: float = np.inf,
 ) -> tuple[tuple[JointWindows, ...], Terms]:
-    """Windows of every joint whose sensors are worn, and the terms they were made from.
+    """Windows of every joint with both sensors available, and the terms they were computed from.
 
     Parameters
     ----------
-    known : terms of sensors that have not changed. unchanged : joints neither of whose sensors has.
-    over_s : so long from the first window on terms are kept, as `find_exchange` looks at them; of the others
-        no more are held at a time than joints need.
+    known : terms of unchanged sensors. unchanged : windows of joints with two unchanged sensors.
+    over_s : terms are kept for this time from the first window on, for `find_exchange`; other terms are held
+        only as long as the joints require them.
     """
     worn = drop_stuck_sensors(recording)
     joints = list_worn_joints(worn.sensors)
@@ -102,11 +102,11 @@ def check_agreement(
     params: AgreementParams | None = None,
     timeline: TimelineParams | None = None,
 ) -> Agreement:
-    """Find exchanged, late and slipped sensors, in this order, and put right what can be.
+    """Detect swapped, late and slipped sensors, in this order, and correct them where possible.
 
     Parameters
     ----------
-    recording : on its axis. timeline : how samples between points of the axis are laid.
+    recording : on the uniform axis. timeline : interpolation of samples between points of the axis.
     """
     params, timeline = params or AgreementParams(), timeline or TimelineParams()
     over_s = params.exchange.over_s
@@ -163,14 +163,14 @@ def check_agreement(
 
 
 def measure_misfits(joints: Iterable[JointWindows]) -> dict[tuple[Segment, Segment], float]:
-    """Joint → median misfit of its two sides; joints without a window are left out."""
+    """Joint → median misfit of its two sides; joints without a window are omitted."""
     return {(j.first, j.second): float(np.median(j.residual)) for j in joints if len(j.t_s)}
 
 
 def _find_all_slips(
     recording: UniformRecording, terms: Terms, joints: Sequence[JointWindows], params: SlipParams
 ) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
-    """Slips while walking and between two standings, as `find_slips` gives them."""
+    """Slips while walking and between two standing periods, in the form of `find_slips`."""
     slips, places = find_slips(recording, terms, joints, params)
     before, stayed = compare_standings(recording, terms, params)
     # a joint near the edge of a walk may blame its other sensor, which both standings then clear
@@ -204,7 +204,7 @@ def _find_doubt(slip: SensorSlip, repaired: bool) -> Window:
 def _lags_over_time(
     t_s: Floats, lags: Iterable[SensorLag], drifts: Iterable[SensorDrift]
 ) -> dict[Segment, Floats]:
-    """Sensor → its lag (n,) s at every sample, of those that are repaired."""
+    """Sensor → lag (n,) s at every sample, for corrected sensors."""
     late = {x.sensors[0]: np.full(len(t_s), x.lag_s) for x in lags if x.told and x.sure}
     for drift in drifts:
         middle, span = 0.5 * (drift.from_s + drift.until_s), max(drift.until_s - drift.from_s, 1e-9)

@@ -1,8 +1,8 @@
-"""Sensors on other segments than was declared: by which of them share a joint, and by which hip is which.
+"""Detection of swapped sensors, from the joints they share and the left-right order of the hips.
 
-A joint's acceleration seen from both sides agrees only where two sensors share that joint. So every labelling
-that is a likely mistake is scored by the joints it would make. Exchanging whole legs leaves the joints as
-they are; there the places of the hips, left and right of the way the feet go, tell.
+The acceleration of a joint centre computed from both sides agrees only if the two sensors share that joint.
+So every plausible mislabelling is scored by the joints it implies. Swapping whole legs leaves the joints
+unchanged; it is detected from the positions of the hips to the left and right of the direction of the feet.
 """
 
 from __future__ import annotations
@@ -52,16 +52,16 @@ LONGEST_SWING_S: Final = 2.0
 
 @dataclass(frozen=True)
 class SensorExchange:
-    """What the joints say about the labels.
+    """Evidence of the joints about the segment labels.
 
     Parameters
     ----------
-    swap : to be undone, empty where the stated labels hold. ratio : misfit of the stated labels over that of
-        the best others. cosine : between the line of the hips and the right-hand side of walking, of the
-        labels that fit; None where it cannot be said.
-    mixed_up : segment → the one that its sensor is stated to be on, where labels are wrong in a way that is
-        no likely exchange; for a person to confirm, nothing is done. mirrored : sensors whose accelerometer
-        has all its signs turned round; neither is done anything about.
+    swap : swap to be undone, empty if the declared labels are right. ratio : misfit of the declared labels
+        over that of the best alternative. cosine : between the hip line and the right-hand side of the
+        walking direction, for the best labels; None if undetermined.
+    mixed_up : segment → declared segment of its sensor, if labels are wrong in a way that is not a common
+        swap; reported for confirmation, not corrected. mirrored : sensors with all accelerometer signs
+        inverted; not corrected either.
     """
 
     swap: Swap
@@ -78,12 +78,12 @@ def find_exchange(
     joint_params: JointParams,
     params: ExchangeParams,
 ) -> SensorExchange:
-    """Judge the stated labels on the first minute of walking.
+    """Check the declared labels on the first minute of walking.
 
     Parameters
     ----------
-    terms : of all worn leg sensors and the pelvis, for `over_s` from the first window on at least. joints :
-        of the stated labels, over the whole take.
+    terms : of all leg sensors and the pelvis, for at least `over_s` from the first window on. joints : for
+        the declared labels, over the whole recording.
     """
     first = min((w.start_s for w in joints), default=np.inf)
     if len(joints) < 2 or first == np.inf:
@@ -127,11 +127,11 @@ def _compare_hips_of(
 def choose_labels(
     compared: Mapping[frozenset[Segment], JointWindows], params: ExchangeParams
 ) -> tuple[Swap, float]:
-    """The labels under which the joints fit best and the misfit of the stated ones over theirs.
+    """The labels under which the joints fit best, and the misfit of the declared ones over theirs.
 
     Parameters
     ----------
-    compared : pairs of sensors, those of every joint of every labelling of `SWAPS`, as stated.
+    compared : sensor pairs for every joint under every labelling of `SWAPS`, by declared label.
     """
     misfits = _misfits(compared)
     worn = frozenset().union(*compared)
@@ -149,14 +149,16 @@ def _misfits(compared: Mapping[frozenset[Segment], JointWindows]) -> dict[frozen
 
 
 def judge_legs(swap: Swap, ratio: float, cosine: float | None, params: ExchangeParams) -> SensorExchange:
-    """Add exchanged legs to the labels that fit where the hips lie the wrong way round."""
+    """Add swapped legs to the best labels if the hips are in the wrong left-right order."""
     if cosine is not None and cosine < params.cosine:
         swap = _simplify((*swap, *LEGS))
     return SensorExchange(swap, ratio, cosine)
 
 
 def undo_exchange(swap: Swap, by_segment: Mapping[Segment, Thing]) -> dict[Segment, Thing]:
-    """The same things on the segments they belong to; where one of two is not worn, the other moves."""
+    """Reassign items to the segments they belong to; if one of two sensors is absent, the other moves
+    alone.
+    """
     out = dict(by_segment)
     for a, b in swap:
         if a in out and b in out:
@@ -169,7 +171,9 @@ def undo_exchange(swap: Swap, by_segment: Mapping[Segment, Thing]) -> dict[Segme
 
 
 def _score(misfits: Mapping[frozenset[Segment], float], swap: Swap) -> float:
-    """Geometric mean of the misfits of the joints under a labelling: ankles fit best, so shares count."""
+    """Geometric mean of the joint misfits under a labelling, so that relative misfits count: ankles fit
+    best.
+    """
     name = {s: s for joint in LEG_JOINTS for s in joint}
     for a, b in swap:
         name[a], name[b] = b, a
@@ -179,7 +183,7 @@ def _score(misfits: Mapping[frozenset[Segment], float], swap: Swap) -> float:
 
 
 def _simplify(swap: Swap) -> Swap:
-    """Pairs that together do what several exchanges in turn do, each segment once."""
+    """Pairs equivalent to several consecutive swaps, with each segment at most once."""
     where = undo_exchange(swap, {s: s for pair in swap for s in pair})
     return tuple((a, b) for a, b in where.items() if a < b and where[b] == a)
 
@@ -190,13 +194,14 @@ def compare_hips(
     rate_hz: float,
     params: ExchangeParams,
 ) -> float | None:
-    """Cosine between the line from the left to the right hip and the right-hand side of walking.
+    """Cosine between the line from the left to the right hip and the right-hand side of the walking
+    direction.
 
-    The way of a foot over a swing is turned into the level frame of the pelvis by the turns of the joints.
+    The displacement of a foot over a swing is rotated into the level frame of the pelvis through the joints.
 
     Parameters
     ----------
-    motions, joints : by the labels that fit; times of the windows are counted from the first sample.
+    motions, joints : by the best labels; window times are relative to the first sample.
     """
     spoken = {joint: w for joint, w in joints.items() if len(w.t_s)}
     hips = [w for joint, w in spoken.items() if "pelvis" in joint]

@@ -1,4 +1,4 @@
-"""Which sensors share a joint."""
+"""Joints with sensors on both segments."""
 
 from __future__ import annotations
 
@@ -23,6 +23,6 @@ CHAINS: Final[tuple[tuple[Segment, ...], ...]] = tuple(
 
 
 def list_worn_joints(worn: Iterable[Segment]) -> tuple[tuple[Segment, Segment], ...]:
-    """Joints both of whose sensors are worn."""
+    """Joints with sensors on both segments."""
     there = set(worn)
     return tuple(joint for joint in LEG_JOINTS if there.issuperset(joint))

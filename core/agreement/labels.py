@@ -1,7 +1,7 @@
-"""Who wears what, from the joints alone: the order of sensors in which neighbours share one.
+"""Assignment of sensors to segments from the joints alone: the order in which neighbours share a joint.
 
-From foot to foot over the pelvis seven sensors make one path. All paths are scored whose middle sensor, the
-pelvis, turns least; which end is the left foot the hips tell (core/agreement/exchange.py).
+From foot to foot via the pelvis seven sensors form one path. All paths are scored whose middle sensor, the
+pelvis, rotates least; which end is the left foot follows from the hips (core/agreement/exchange.py).
 """
 
 from __future__ import annotations
@@ -27,10 +27,9 @@ class SortedLabels:
 
     Parameters
     ----------
-    stated_for : best label → the sensor that was stated to be worn elsewhere or there, by its stated label.
-        Left and right may be exchanged.
-    misfit : geometric mean of the joints' misfits; stated : of the labels as stated. next : of the best path
-        of another order.
+    stated_for : best label → declared label of that sensor. Left and right may be swapped.
+    misfit : geometric mean of the joint misfits. stated : for the declared labels. next : for the best path
+        of a different order.
     """
 
     stated_for: Mapping[Segment, Segment]
@@ -40,33 +39,33 @@ class SortedLabels:
 
     @property
     def gain(self) -> float:
-        """Sum over the joints of ln(misfit as stated / as sorted)."""
+        """Sum over the joints of ln(misfit as declared / as sorted)."""
         return (len(PATH) - 1) * float(np.log(self.stated / self.misfit))
 
     def is_clear(self, exchanged: float, ratio: float, distinct: float) -> bool:
-        """Whether it fits better than what is stated or exchanged, by a ratio, and than any other order."""
+        """Whether it fits better than the declared or swapped labels by a ratio, and than any other order."""
         return exchanged > ratio * self.misfit and self.next > distinct * self.misfit
 
     def exchange_legs(self) -> dict[Segment, Segment]:
-        """The same order with the left foot at its other end."""
+        """The same order with left and right interchanged."""
         return dict(zip(PATH, reversed([self.stated_for[s] for s in PATH]), strict=True))
 
 
 @cache
 def _list_paths() -> NDArray[np.int64]:
-    """Every order of seven sensors (2520, 7), of two that are the same backwards one."""
+    """Every order of seven sensors (2520, 7), one of each pair of reversed orders."""
     return np.array([p for p in permutations(range(len(PATH))) if p[0] < p[-1]], np.int64)
 
 
 def sort_by_joints(
     misfits: Mapping[frozenset[Segment], float], rates: Mapping[Segment, float], calmest: float
 ) -> SortedLabels | None:
-    """Score every order of seven sensors; None with others than these seven.
+    """Score every order of seven sensors; None with any other set of sensors.
 
     Parameters
     ----------
-    misfits : of every pair, by stated labels. rates : RMS of the rate of each sensor while walking, rad/s.
-    calmest : the pelvis turns at most so much more than the sensor that turns least.
+    misfits : of every pair, by declared labels. rates : RMS of the rate of each sensor while walking, rad/s.
+        calmest : maximum ratio of the rate of the pelvis to that of the calmest sensor.
     """
     if set(rates) != set(PATH) or any(frozenset(x) not in misfits for x in permutations(PATH, 2)):
         return None

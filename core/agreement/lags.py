@@ -1,7 +1,8 @@
-"""Lags across joints → whose clock is late, and whose runs fast or slow.
+"""Lags across joints → clock offsets and clock drifts of sensors.
 
-Joints see differences of clocks only: the majority's clock is zero. Named are the fewest sensors, or whole
-distal chains, that explain the lags of all joints (docs/science/agreement.md, "Late sensors").
+Joints observe only differences between clocks: the clock of the majority is the reference. The result is the
+smallest set of sensors, or whole distal chains, that explains the lags of all joints
+(docs/science/agreement.md, "Late sensors").
 """
 
 from __future__ import annotations
@@ -43,13 +44,14 @@ FAR: Final = 0.25
 
 @dataclass(frozen=True)
 class SensorLag:
-    """Sensors whose clock is late by one lag.
+    """Sensors with a common clock offset.
 
     Parameters
     ----------
-    sensors : one, or those below one joint. lag_s : positive = late, mean over the take. sd_s : of it, with
-        what skin and joint make of a right clock. told : it passes the limits. sure : one sensor, and more
-        than a hip or a single pair of sensors speaks; only then is it repaired.
+    sensors : one, or all distal to one joint. lag_s : positive = late, mean over the recording. sd_s : of it,
+        including the apparent lag caused by soft tissue and joint. told : the limits for a report are
+        exceeded. sure : a single sensor, with evidence from more than a hip or one pair of sensors; required
+        for correction.
     """
 
     sensors: tuple[Segment, ...]
@@ -61,7 +63,7 @@ class SensorLag:
 
 @dataclass(frozen=True)
 class SensorDrift:
-    """A clock that runs slow (positive) or fast: change of the lag over the take.
+    """A clock that runs slow (positive) or fast: change of the lag over the recording.
 
     Parameters
     ----------
@@ -76,9 +78,9 @@ class SensorDrift:
 
 
 def find_sensor_lags(joints: Sequence[JointWindows], params: LagParams) -> tuple[SensorLag, ...]:
-    """The fewest sensors whose lags explain those of the joints.
+    """The smallest set of sensors whose lags explain those of the joints.
 
-    Forward selection by weighted squares: each sensor or group must lower them by more than z².
+    Forward selection by weighted least squares: each sensor or group must reduce the sum by more than z².
     """
     use = _speaking(joints, params)
     if not use:
@@ -111,9 +113,9 @@ def find_sensor_lags(joints: Sequence[JointWindows], params: LagParams) -> tuple
 
 
 def find_drifts(joints: Sequence[JointWindows], params: LagParams) -> tuple[SensorDrift, ...]:
-    """Single sensors whose lag changes over the take; slopes of the joints by Theil and Sen.
+    """Single sensors whose lag changes over the recording; Theil-Sen slopes of the joint lags.
 
-    What skin and joint make of a clock is constant and does not enter.
+    The apparent lag caused by soft tissue and joint is constant and cancels.
     """
     use = [w for w in _speaking(joints, params) if len(w.t_s) >= DRIFT_WINDOWS]
     if not use:
@@ -140,24 +142,24 @@ def find_drifts(joints: Sequence[JointWindows], params: LagParams) -> tuple[Sens
 
 
 def list_judged(joints: Sequence[JointWindows], params: LagParams) -> frozenset[Segment]:
-    """Sensors whose clock a joint compares with that of another."""
+    """Sensors whose clock can be compared with another one at a joint."""
     return frozenset(s for w in _speaking(joints, params) for s in (w.first, w.second))
 
 
 def _speaking(joints: Sequence[JointWindows], params: LagParams) -> list[JointWindows]:
-    """Joints with windows that hang together well enough to say something about time."""
+    """Joints whose windows are consistent enough to estimate a lag."""
     kept = [w.choose(w.certain & (w.residual < params.worst_residual)) for w in joints]
     return [w for w in kept if len(w.t_s) >= params.least_windows]
 
 
 def _further(use: Sequence[JointWindows], speaking: Sequence[JointWindows]) -> int:
-    """Other joints that hang on these: who says which of two sensors is the late one."""
+    """Number of further joints connected to these, which can decide which of two sensors is the late one."""
     ends = {s for w in speaking for s in (w.first, w.second)}
     return sum(w not in speaking and bool(ends & {w.first, w.second}) for w in use)
 
 
 def _median_lag(w: JointWindows, params: LagParams) -> tuple[float, float]:
-    """Lag of a joint and its standard deviation; windows that overlap count once."""
+    """Lag of a joint and its standard deviation, corrected for overlapping windows."""
     bias: Mapping[str, float] = {"hip": params.hip_sd_s, "knee": params.knee_sd_s, "ankle": params.ankle_sd_s}
     middle = float(np.median(w.lag_s))
     spread = np.hypot(MAD * float(np.median(np.abs(w.lag_s - middle))), LEAST_SPREAD_S)
@@ -168,7 +170,7 @@ def _median_lag(w: JointWindows, params: LagParams) -> tuple[float, float]:
 
 
 def _column(use: Sequence[JointWindows], sd: Floats, sensors: tuple[Segment, ...]) -> Floats:
-    """What one second of lag of these sensors does to the joints, over their spreads (joints,)."""
+    """Effect of one second of lag of these sensors on the joints, in units of their spreads (joints,)."""
     return np.array([float(w.second in sensors) - float(w.first in sensors) for w in use]) / sd
 
 
@@ -179,7 +181,7 @@ def _best_addition(
     chosen: Sequence[tuple[Segment, ...]],
     params: LagParams,
 ) -> tuple[Segment, ...] | None:
-    """The sensor or group that explains most of what is left, None when none explains enough."""
+    """The sensor or group that explains most of the residual, None if none explains enough."""
     worn = sorted({s for w in use for s in (w.first, w.second)})
     linked = {frozenset((w.first, w.second)) for w in use}
     groups = [g for g in CHAINS if all(frozenset(e) in linked for e in pairwise(g))]

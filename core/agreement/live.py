@@ -1,7 +1,8 @@
-"""What the sensors of a live take say about each other: told while somebody walks, repaired by the analysis.
+"""Consistency checks between the sensors of a live recording: reported during walking, corrected in the
+analysis.
 
-Listening begins where all stood for calibration; everything is a function of the samples, whatever blocks
-they came in. Samples are only collected as they come: comparing them waits until whoever coaches has been
+Checks start at quiet standing for calibration; results depend only on the samples, not on their division into
+blocks. Incoming samples are only collected; the comparison is deferred until real-time feedback has been
 served.
 """
 
@@ -36,7 +37,7 @@ Key = tuple[str, tuple[Segment, ...]]
 
 @dataclass(frozen=True)
 class _Said:
-    """Something that holds: the notice, the sensors as they are worn, verdicts that missed it since."""
+    """An active notice: the sensors concerned by actual segment, and consecutive verdicts without it."""
 
     notice: Notice
     worn: tuple[Segment, ...]
@@ -45,11 +46,11 @@ class _Said:
 
 
 class LiveAgreement:
-    """Collects samples as they come and compares the sensors when asked to.
+    """Collects incoming samples and compares the sensors on request.
 
     Parameters
     ----------
-    segments : of the blocks' columns.
+    segments : of the columns of the blocks.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class LiveAgreement:
 
     @property
     def doubts(self) -> Mapping[Segment, str]:
-        """Worn segment → code of what is said of its sensor and still holds."""
+        """Segment → code of the active notice about its sensor."""
         return {s: x.notice.code for x in self._said.values() for s in x.worn}
 
     def push(self, block: UniformBlock, stood: Sequence[int] = ()) -> None:
@@ -81,7 +82,8 @@ class LiveAgreement:
 
         Parameters
         ----------
-        stood : samples of the axis up to which all stood, in the block or at its end, in order.
+        stood : samples of the axis at which a standing period of all sensors ended, in the block or at its
+            end, in order.
         """
         if not len(self._worn):
             return
@@ -97,13 +99,13 @@ class LiveAgreement:
         self._collect(block, start, len(block))
 
     def forget(self) -> None:
-        """Begin anew with the next standing: the therapist puts something right."""
+        """Start over with the next standing period, after a correction by the therapist."""
         self._second_at = self._comparison = None
         self._due.clear()
         self._said, self._runs = {}, {}
 
     def compare(self) -> list[Notice]:
-        """Look at the seconds that are complete; what is new."""
+        """Process the completed seconds and return new notices."""
         fresh: list[Notice] = []
         while self._due:
             one = self._due.popleft()
@@ -118,7 +120,7 @@ class LiveAgreement:
         return fresh
 
     def _collect(self, block: UniformBlock, start: int, stop: int) -> None:
-        """Add rows of a block; a whole second is due once somebody stood."""
+        """Append rows of a block; after the first standing period every full second is queued."""
         while start < stop:
             end = stop
             if self._second_at is not None:
@@ -143,7 +145,7 @@ class LiveAgreement:
         )
 
     def _tell(self, verdict: Verdict) -> list[Notice]:
-        """What is new of a verdict, and what no longer holds."""
+        """New notices of a verdict, including those that no longer hold."""
         p = self._params
         swap = verdict.exchange.swap
         holds: dict[Key, _Said] = {}
@@ -170,7 +172,7 @@ class LiveAgreement:
         return fresh + self._take_back(holds, verdict)
 
     def _take_back(self, holds: Mapping[Key, _Said], verdict: Verdict) -> list[Notice]:
-        """What was said and is missed for some time."""
+        """Notices that have been absent from the verdicts for some time."""
         fresh = []
         for key, one in list(self._said.items()):
             if key in holds or (one.slip is not None and one.slip.segment not in verdict.back):
@@ -183,7 +185,7 @@ class LiveAgreement:
 
 
 def compile_live_agreement() -> None:
-    """Compile the kernels as a stream calls them, so that the first take does not wait for them."""
+    """Compile the kernels with the types used by a stream, so that the first recording is not delayed."""
     compile_agreement_kernels()
     n = 200
     wave = np.random.default_rng(0).normal(size=(2, 10 * n, 7, 3))

@@ -1,6 +1,6 @@
-"""Sensors compared second by second from one standing on: labels first, then clocks and places.
+"""Second-by-second comparison of sensors after standing: labels first, then clocks and slips.
 
-The rules are those of a file (exchange.py, lags.py, slips.py), on the windows of the last seconds.
+The rules are those for files (exchange.py, lags.py, slips.py), applied to the windows of the last seconds.
 """
 
 from __future__ import annotations
@@ -36,13 +36,13 @@ HIPS: Final[frozenset[Segment]] = frozenset(("pelvis", "thigh_l", "thigh_r"))
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the last seconds of walking say, all of it by the labels that fit.
+    """Result of the last seconds of walking, by the best labels.
 
     Parameters
     ----------
-    t_s : end of the last window, on the axis of the take. exchange : how the labels were settled.
-    lags : beyond the limits. slips : of sensors that were not asked for. back : of those that were, the ones
-        whose places turned back.
+    t_s : end of the last window, on the axis of the recording. exchange : evidence on the labels. lags :
+        those above the limits. slips : newly detected ones. back : sensors with a known slip that has been
+        reversed.
     """
 
     t_s: float
@@ -53,7 +53,7 @@ class Verdict:
 
 
 class SensorComparison:
-    """The sensors from one standing on.
+    """Comparison of the sensors after one standing period.
 
     Parameters
     ----------
@@ -86,11 +86,11 @@ class SensorComparison:
         self._axes: dict[Segment, Floats] = {}
 
     def push(self, new: RawSecond, slipped: Collection[SensorSlip] = ()) -> Verdict | None:
-        """Add a second; what is to be said, None while nobody walks or the labels are not settled.
+        """Add a second; returns a verdict, None without walking or while the labels are undecided.
 
         Parameters
         ----------
-        slipped : told of already.
+        slipped : slips already reported.
         """
         terms = self._terms.push(new)
         if terms is None:
@@ -112,7 +112,9 @@ class SensorComparison:
         return pair.push(terms, (self._column[a], self._column[b]), middle_s)
 
     def _settle_labels(self) -> None:
-        """Believe what was said several times in a row, the sides included; then only joints go on."""
+        """Accept labels that were found several times in a row, sides included; afterwards only joints are
+        continued.
+        """
         p = self._params
         counts = [len(x) for x in self._pairs.values()]
         patient = max(counts) >= p.patient_windows
@@ -141,7 +143,7 @@ class SensorComparison:
         self._pairs = {k: x for k, x in self._pairs.items() if k in kept}
 
     def _read_motions(self, worn_as: Mapping[Segment, Segment]) -> tuple[float, dict[Segment, LevelMotion]]:
-        """Start on the axis, and how sensors moved since; segment by the labels that fit → as stated."""
+        """Start on the axis, and the motions since; segment by the best labels → as declared."""
         start_s = (self._first + self._terms.motion_start) / self._rate_hz
         return start_s, {s: self._terms.read_motion(self._column[x])[0] for s, x in worn_as.items()}
 
@@ -153,7 +155,7 @@ class SensorComparison:
     def _find_slips(
         self, joints: Mapping[Pair, JointWindows], slipped: Collection[SensorSlip]
     ) -> tuple[tuple[SensorSlip, ...], frozenset[Segment]]:
-        """Slips of sensors that were not told of, and those told of that came back."""
+        """New slips, and sensors whose reported slip has been reversed."""
         params = self._params.agreement.slips
         axes = self._find_axes()
         moving = [w.choose(self._is_moving(joint, w)) for joint, w in joints.items()]
@@ -184,13 +186,13 @@ class SensorComparison:
         return tuple(found), frozenset(back)
 
     def _is_walked(self, found: PlaceTurns, at_s: float) -> bool:
-        """Whether somebody walked at a moment, or has walked for long enough since."""
+        """Whether there was walking at a moment, or enough walking since."""
         before, after = found.t_s <= at_s - self._half, found.t_s >= at_s + self._half
         during = ~before & ~after
         return bool(during.any()) or int(after.sum()) >= self._params.pause_windows
 
     def _find_axes(self) -> dict[Segment, Floats]:
-        """What every leg sensor turns about most, the way it pointed the second before."""
+        """Main rotation axis of every leg sensor, with the same sign as in the previous second."""
         for s, stated in self._worn_as.items():
             if s == "pelvis":
                 continue
@@ -199,7 +201,7 @@ class SensorComparison:
         return dict(self._axes)
 
     def _is_moving(self, joint: Pair, w: JointWindows) -> Bools:
-        """Windows (m,) in which the legs swing."""
+        """Windows (m,) with swinging legs."""
         stated = {s: self._worn_as[s] for s in joint}
         swing = self._pairs[frozenset(stated.values())].read_swing()
         return is_moving(

@@ -1,4 +1,4 @@
-"""Joints while samples come: the sums of the last seconds, and the windows that were solved from them."""
+"""Streaming comparison at joints: the sums of the last seconds, and the windows solved from them."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class LivePair:
         return self._count
 
     def push(self, new: TermSecond, columns: tuple[int, int], middle_s: float) -> bool:
-        """Add a second; whether the window that ends with it says something.
+        """Add a second; returns whether the window ending with it is usable.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class LivePair:
         return bool(len(found))
 
     def read(self) -> JointWindows:
-        """The windows that are kept."""
+        """The stored windows."""
         rows = self._rows[KEPT - self._count :]
         return read_windows(
             self.names, rows[:, 1:12], rows[:, 0].copy(), self._rate_hz, self._chunk, self._params,
@@ -79,7 +79,7 @@ class LivePair:
 
 
 def list_pairs(worn: Iterable[Segment]) -> tuple[Pair, ...]:
-    """Joints of the stated labels, and what would be joints if sensors were exchanged."""
+    """Joints of the declared labels, and pairs that would be joints if sensors were swapped."""
     there = frozenset(worn)
     found: dict[frozenset[Segment], Pair] = {frozenset(x): x for x in list_worn_joints(there)}
     for swap in SWAPS:
@@ -91,7 +91,7 @@ def list_pairs(worn: Iterable[Segment]) -> tuple[Pair, ...]:
 
 
 def relabel(swap: Swap, pairs: Mapping[frozenset[Segment], JointWindows]) -> dict[Pair, JointWindows]:
-    """Joints by the labels that fit, of those pairs that are there."""
+    """Joints by the best labels, for the available pairs."""
     names = undo_exchange(swap, {s: s for x in pairs for s in x})
     found = {}
     for a, b in LEG_JOINTS:

@@ -1,7 +1,7 @@
-"""Terms of the sensors second by second, as those of a file but for the ends of what a filter sees.
+"""Streaming terms of the sensors, second by second; equal to those of a file except for filter edge effects.
 
-The filters of core/agreement/terms.py look both ways; a stream gives them a little of what follows and goes
-on. Each second of terms is so 1.3 s behind its samples, and within 2 % of what the file has.
+The filters of core/agreement/terms.py are non-causal; the stream gives them a short look-ahead. Each second
+of terms is therefore 1.3 s late, and within 2 % of the terms of the file.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ class RawSecond(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class TermSecond:
-    """Terms of one second and what lies around it within the widest lag.
+    """Terms of one second with margins of the widest lag.
 
     Parameters
     ----------
-    M : (k, m, 3, 4). usable : (k, m). start : of the second, samples since the first that was pushed.
+    M : (k, m, 3, 4). usable : (k, m). start : of the second, samples since the first one pushed.
     power : (k,) mean square of the rates in it, rad²/s². moments : (k, 3, 3) mean products of the rates.
     """
 
@@ -72,11 +72,11 @@ class _Motion:
 
 
 class LiveTerms:
-    """Terms of some sensors while samples come.
+    """Streaming terms of some sensors.
 
     Parameters
     ----------
-    standing : the second before; the sensors are at rest in it.
+    standing : the preceding second, with the sensors at rest.
     """
 
     def __init__(self, standing: RawSecond, rate_hz: float, params: JointParams) -> None:
@@ -90,7 +90,7 @@ class LiveTerms:
         self._seconds = 0
 
     def push(self, new: RawSecond) -> TermSecond | None:
-        """The next second; terms of an earlier one, once enough has been seen on either side."""
+        """Push the next second; returns the terms of an earlier one, once enough samples follow it."""
         rate = new.gyr - self._bias
         q = np.empty((rate.shape[1], len(rate), 4))
         for i, (state, norm) in enumerate(self._tilt):
@@ -106,7 +106,7 @@ class LiveTerms:
         return self._cut(len(rate)) if len(self._slow) == BEFORE + 1 + AFTER else None
 
     def read_motion(self, sensor: int) -> tuple[LevelMotion, Bools]:
-        """How one sensor moved of late, and which of these samples it measured."""
+        """Recent motion of one sensor, and the validity of its samples."""
         parts = self._motion
         motion = LevelMotion(
             np.concatenate([x.q[sensor] for x in parts]),
@@ -117,16 +117,16 @@ class LiveTerms:
 
     @property
     def motion_start(self) -> int:
-        """First sample of `read_motion`, since the first that was pushed."""
+        """First sample of `read_motion`, relative to the first one pushed."""
         return self._start_of(len(self._motion) - 1)
 
     def _start_of(self, ago: int) -> int:
-        """First sample of the second of motion so many before the last one."""
+        """First sample of the motion that many seconds before the last one."""
         n = len(self._raw[-1][1].acc)
         return (self._seconds - 1 - ago) * n - self._settle
 
     def _advance(self, n: int) -> None:
-        """Lay the second that ends `_settle` samples before the last."""
+        """Compute the motion of the second that ends `_settle` samples before the last."""
         (q0, old), (q1, new) = self._raw
         m = self._settle
         part = slice(n - 2 * m, None)
@@ -142,7 +142,7 @@ class LiveTerms:
         self._motion.append(_Motion(q[:, inner], level[:, :, inner], rate[:, inner], valid[:, inner]))
 
     def _cut(self, n: int) -> TermSecond:
-        """Terms of the second that `AFTER` more have followed."""
+        """Terms of the second that is followed by `AFTER` more."""
         slow = np.concatenate(self._slow, axis=2)
         widest = round(self._params.widest_s * self._rate_hz / self._thin)
         first = BEFORE * n // self._thin
@@ -162,7 +162,7 @@ class LiveTerms:
 
 
 def _learn(standing: RawSecond, rate_hz: float) -> tuple[Floats, list]:  # type: ignore[type-arg]
-    """Biases (k, 3) and where the tilts of k sensors begin, by a second of rest."""
+    """Biases (k, 3) and initial tilts of k sensors, from a second of rest."""
     bias, tilts = [], []
     for i in range(standing.acc.shape[1]):
         valid = standing.valid[:, i]

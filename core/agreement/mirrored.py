@@ -1,7 +1,9 @@
-"""Accelerometers whose signs are all turned round: the mirror image of a movement fits no joint.
+"""Detection of accelerometers with all signs inverted: a mirror image of a movement is consistent with no
+joint.
 
-With f → −f what seems up is down: seen level, heights and one horizontal direction of every place swap their
-sign, and the specific force is seen in a mirror. No rotation does that, so neighbours disagree.
+With f → −f up and down are interchanged: after levelling, heights and one horizontal direction of every
+position change sign, and the specific force is mirrored. No rotation does that, so neighbouring sensors
+disagree.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ LEVEL_AGAIN: Final[Floats] = np.array([1.0, -1.0, -1.0])
 
 
 def turn_round(terms: TermsPart) -> TermsPart:
-    """The terms of the same sensor with −f, levelled anew by half a turn about a horizontal line."""
+    """The terms of the same sensor for −f, levelled again by half a turn about a horizontal axis."""
     M = terms.M * LEVEL_AGAIN[:, None]
     M[:, :, 3] *= -1.0
     return replace(terms, M=np.ascontiguousarray(M))
@@ -38,11 +40,12 @@ def find_mirrored(
     joint_params: JointParams,
     params: ExchangeParams,
 ) -> tuple[frozenset[Segment], float]:
-    """Sensors that fit their neighbours only with −f, and the sum of ln(misfit as stated / so) they gain.
+    """Sensors that fit their neighbours only with −f, and the gain as the sum of ln(misfit as declared /
+    inverted).
 
     Parameters
     ----------
-    misfits : of the joints as stated.
+    misfits : of the joints as declared.
     """
     gains: dict[frozenset[Segment], float] = {}
     bad: set[frozenset[Segment]] = set()

@@ -1,4 +1,4 @@
-"""Parameters of the agreement of sensors: what is compared, and from where on something is told."""
+"""Parameters of the consistency checks between sensors: comparison and reporting limits."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from sagittal.core.fusion.attitude import AttitudeParams
 
 @dataclass(frozen=True)
 class JointBandParams:
-    """Which part of a joint's acceleration is looked at (docs/science/agreement.md, "One idea").
+    """Frequency band of the joint acceleration used for comparison (docs/science/agreement.md, "One idea").
 
     Parameters
     ----------
-    band_hz : of the acceleration. Below 0.5 Hz lies the error of the tilt, above 6 Hz the flesh: with bands
-        up to 12 Hz clean knees seem 5 to 13 ms late (neura_walk, qmt_fullbody); 4 and 6 Hz give the same.
-    working_hz : signals are thinned to about this rate; eight samples of the fastest component.
+    band_hz : of the acceleration. Below 0.5 Hz tilt error dominates, above 6 Hz soft-tissue movement: with
+        bands up to 12 Hz error-free knees appear 5 to 13 ms late (neura_walk, qmt_fullbody); 4 and 6 Hz give
+        equal results.
+    working_hz : signals are decimated to about this rate: eight samples per period of the fastest component.
     """
 
     band_hz: tuple[float, float] = (0.5, 6.0)
@@ -25,15 +26,15 @@ class JointBandParams:
 
 @dataclass(frozen=True)
 class JointSumParams(JointBandParams):
-    """How the two sources of that acceleration are compared, window by window.
+    """Window-by-window comparison of the joint acceleration from both sides.
 
     Parameters
     ----------
-    chunk_s, window_chunks : products are summed by chunk, a window is so many of them.
-    least_chunks : of a window without a lost sample.
-    least_power : RMS of the joint's acceleration below which nobody moves, m/s².
-    place_sd_m : how far from its sensor a joint may be; with noise_mps2 a weak prior that keeps solvable what
-        hardly moves.
+    chunk_s, window_chunks : products are summed by chunk, a window consists of this many chunks.
+        least_chunks : minimum number without a lost sample.
+    least_power : RMS of the joint acceleration below which the person is not moving, m/s².
+    place_sd_m : prior distance of a joint from its sensor; with noise_mps2 a weak prior that regularises
+        small movements.
     """
 
     chunk_s: float = 1.0
@@ -46,13 +47,13 @@ class JointSumParams(JointBandParams):
 
 @dataclass(frozen=True)
 class JointParams(JointSumParams):
-    """The same of sensors whose clocks may differ and whose tilt is not known.
+    """The same with unknown clock offsets and unknown tilt.
 
     Parameters
     ----------
-    widest_s : lags looked at, either side.
-    windows : a longer take has its windows further apart, up to half a window; so many are enough.
-    attitude : of the tilt; 0.2/s forgets a wrong bias sooner than the orientation of the figure needs.
+    widest_s : largest lag considered, in either direction.
+    windows : sufficient number of windows; longer recordings use a wider spacing, up to half a window.
+    attitude : of the tilt filter; 0.2/s recovers from a wrong bias faster than the pose estimation requires.
     """
 
     widest_s: float = 0.16
@@ -62,19 +63,20 @@ class JointParams(JointSumParams):
 
 @dataclass(frozen=True)
 class LagParams:
-    """When a late sensor is told, and when it is repaired (docs/science/agreement.md, "Late sensors").
+    """Reporting and correction of late sensors (docs/science/agreement.md, "Late sensors").
 
     Parameters
     ----------
-    repair : False leaves the signals as they are; what is found is told all the same.
-    least_s : of one sensor. least_group_s : of several with one clock, or where a hip alone speaks: clean
-        hips of two people show up to 19 ms. warn_s : from here on a warning.
-    z : lag over its spread, that of the joint included.
-    hip_sd_s, knee_sd_s, ankle_sd_s : what skin and joint make of a clock without lag: standard deviations on
+    repair : False leaves the signals unchanged; notices are given all the same.
+    least_s : minimum for one sensor. least_group_s : minimum for several with one clock, or with only a hip
+        as evidence: error-free hips of two people show up to 19 ms. warn_s : threshold for a warning.
+    z : minimum ratio of the lag to its spread, including that of the joint.
+    hip_sd_s, knee_sd_s, ankle_sd_s : apparent lag caused by soft tissue and joint: standard deviations in
         neura_walk and qmt_fullbody; simulated people have 0.5, 0.2 and 0.4 ms.
-    worst_residual : a joint that fits worse, of its own acceleration, says nothing about time.
-    least_windows : fewer say nothing.
-    drift_s, drift_z : change over the take that is told; the bias of a joint does not enter.
+    worst_residual : joints with a larger misfit, relative to their acceleration, are not used for lags.
+    least_windows : minimum number of windows.
+    drift_s, drift_z : reporting limits of the change over the recording, in which the constant lag of a joint
+        cancels.
     """
 
     repair: bool = True
@@ -93,24 +95,25 @@ class LagParams:
 
 @dataclass(frozen=True)
 class ExchangeParams:
-    """When sensors are said to be exchanged (docs/science/agreement.md, "Exchanged sensors").
+    """Criteria for swapped sensors (docs/science/agreement.md, "Exchanged sensors").
 
     Parameters
     ----------
-    repair : False leaves them on the segments that were declared; what is found is told all the same.
-    over_s : so much of the walk is compared.
-    ratio : another labelling fits so much better than the stated one: right ones have at most 0.84
-        (neura_walk, qmt_fullbody) and 0.6 (simulated people), wrong ones at least 1.17.
-    cosine : between the line of the hips and the right-hand side of walking, below which the legs are
-        exchanged; as stated it is +0.91 and more (qmt_fullbody; others +0.97), exchanged the opposite.
-    least_way_m : a swing that leads less far says nothing about the direction of walking.
-    distinct : what is proposed beyond the exchanges fits so much better than the next best: the right order
-        of seven sensors does by 1.16 (qmt_fullbody), 1.22 (neura_walk) and 1.5 (simulated people).
-    mirrored : joints fit so much better with an accelerometer's signs turned round; right ones at most 1.03.
-    worst_residual : a hip that fits worse, of its own acceleration, does not say where it lies; nor are signs
-        turned round where a joint still fits worse. Right hips have at most 0.68 (qmt_fullbody), those of a
-        gyroscope with wrong signs 1.2 and more.
-    calmest : the pelvis turns at most so much more than the sensor that turns least (our choice).
+    repair : False leaves them on the declared segments; notices are given all the same.
+    over_s : duration of walking used for the comparison.
+    ratio : minimum improvement of an alternative labelling over the declared one: correct labels have at most
+        0.84 (neura_walk, qmt_fullbody) and 0.6 (simulated people), wrong labels at least 1.17.
+    cosine : between the hip line and the right-hand side of the walking direction, below which the legs are
+        swapped; it is at least +0.91 for correct labels (qmt_fullbody; others +0.97), the opposite for
+        swapped legs.
+    least_way_m : shorter swings are not used for the direction of walking.
+    distinct : minimum improvement of a proposal other than a common swap over the next best: the right order
+        of seven sensors has 1.16 (qmt_fullbody), 1.22 (neura_walk) and 1.5 (simulated people).
+    mirrored : minimum improvement with inverted accelerometer signs; correct sensors have at most 1.03.
+    worst_residual : hips with a larger misfit, relative to their acceleration, are not located, and signs are
+        not inverted if a joint still has a larger misfit. Correct hips have at most 0.68 (qmt_fullbody),
+        those with wrong gyroscope signs at least 1.2.
+    calmest : maximum ratio of the rate of the pelvis to that of the calmest sensor (our choice).
     """
 
     repair: bool = True
@@ -126,28 +129,29 @@ class ExchangeParams:
 
 @dataclass(frozen=True)
 class SlipParams:
-    """When a slip is told, and when it is repaired (docs/science/agreement.md, "Slipped sensors").
+    """Reporting and correction of sensor slip (docs/science/agreement.md, "Slipped sensors").
 
     Parameters
     ----------
-    repair : False leaves the signals as they are; what is found is told all the same.
-    least_rad : smallest turn told, unwitnessed_rad more where too few strides confirm it.
-    z : turn over the scatter of the windows, which is never taken less than floor_rad.
-    near_s : windows so far from a moment speak about it. lasting : share of the turn that must be left over
-        the whole take: else it came back.
-    alone : largest turn of another sensor at the same time, over this one.
-    alone_standing : the same from standing to walking and to standing. standing_sd_rad : how well such a slip
-        is known: both legs walk alike within that (neura_walk, simulated people).
-    agree : share of the turn that the strides must show, where there are `strides` on both sides; each side
-        is the median of up to `near` of them.
-    sure_rad : a larger turn at twice that z is told whatever the strides say.
-    worst_residual : windows whose joint fits worse say nothing. least_swing : nor do those in which a leg
-        sensor turns less, rad/s RMS. least_windows : on either side.
-    judged : share of the walk at whose moments a slip would be seen; with less it is not said that a sensor
-        stayed.
-    misfit : places that also shrink or grow by more than this share did not turn but something else.
-    within_s : strides so near to the change are left out, at least.
-    straight_rad : strides that turn by more are no witnesses.
+    repair : False leaves the signals unchanged; notices are given all the same.
+    least_rad : smallest reported rotation; unwitnessed_rad is added if too few strides confirm it.
+    z : minimum ratio of the rotation to the scatter of the windows, which is at least floor_rad.
+    near_s : windows within this distance of a moment are used. lasting : fraction of the rotation that must
+        persist over the whole recording, otherwise it was temporary.
+    alone : largest simultaneous rotation of another sensor, relative to this one.
+    alone_standing : the same from standing to walking and to standing. standing_sd_rad : uncertainty of such
+        a slip: symmetry of the two legs in walking (neura_walk, simulated people).
+    agree : fraction of the rotation that the strides must confirm if there are at least `strides` before and
+        after; each side is the median of up to `near` of them.
+    sure_rad : a larger rotation at twice that z is reported regardless of the strides.
+    worst_residual : windows with a larger joint misfit are ignored. least_swing : so are those with a lower
+        rate of a leg sensor, rad/s RMS. least_windows : minimum before and after.
+    judged : fraction of the walk in which a slip would be detected; below it a sensor is not reported as
+        stable.
+    misfit : maximum relative change of the joint positions not explained by the rotation; above it the change
+        is no slip.
+    within_s : minimum margin around the change in which strides are ignored.
+    straight_rad : strides with a larger turn are not used.
     """
 
     repair: bool = True
@@ -175,7 +179,7 @@ class SlipParams:
 
 @dataclass(frozen=True)
 class AgreementParams:
-    """Everything about what the sensors say of each other."""
+    """Parameters of all consistency checks between sensors."""
 
     joints: JointParams = field(default_factory=JointParams)
     exchange: ExchangeParams = field(default_factory=ExchangeParams)
@@ -185,18 +189,18 @@ class AgreementParams:
 
 @dataclass(frozen=True)
 class LiveAgreementParams:
-    """When what the joints show is told while samples come (docs/science/agreement.md, "Live").
+    """Reporting of inconsistencies in a stream (docs/science/agreement.md, "Live").
 
     Parameters
     ----------
-    agreement : limits, those of a file.
-    least_windows : of every pair of sensors before labels are judged. patient_windows : of any pair, and what
-        is missing is left out.
-    confirmed : verdicts in a row, one a second, before something is told. cleared : without it before it is
-        taken back. Both are our choice.
-    pause_windows : walked after a pause in which a sensor may have slipped: standing up pulls clothes and
-        sensors, and some of that comes back (qmt_fullbody).
-    lag_windows : the last ones, from which lags are told.
+    agreement : limits, as for files.
+    least_windows : windows of every sensor pair before labels are judged. patient_windows : windows of any
+        pair, after which missing pairs are ignored.
+    confirmed : consecutive verdicts, one per second, before a notice. cleared : consecutive verdicts without
+        it before the notice is withdrawn. Both are our choice.
+    pause_windows : windows of walking required after a pause in which a sensor may have slipped: standing up
+        shifts clothes and sensors, partly reversibly (qmt_fullbody).
+    lag_windows : number of the latest windows used for lags.
     """
 
     agreement: AgreementParams = field(default_factory=AgreementParams)

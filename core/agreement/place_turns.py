@@ -1,4 +1,4 @@
-"""How the joints' places beside a sensor turn in its axes, and when they turned for good: the judge of slips.
+"""Rotation of the joint positions in the axes of an adjacent sensor, and detection of lasting changes (slip).
 
 Equations: docs/science/agreement.md, "Slipped sensors".
 """
@@ -30,11 +30,11 @@ LIKELY: Final = 0.5
 
 @dataclass(frozen=True, eq=False)
 class PlaceTurns:
-    """Turn of the joints' places about the axis across, window by window.
+    """Rotation of the joint positions about the medio-lateral axis, window by window.
 
     Parameters
     ----------
-    t_s, turn : (m,) s, rad. places : (m, joints, 3) across the axis, turned back, m.
+    t_s, turn : (m,) s, rad. places : (m, joints, 3) perpendicular to the axis, rotated back, m.
     step_s : between windows.
     """
 
@@ -46,7 +46,7 @@ class PlaceTurns:
 
 @dataclass(frozen=True)
 class PlaceStep:
-    """A turn for good: when, by how much, over its scatter, and that, s and rad."""
+    """A lasting rotation: time s, angle rad, ratio to its scatter, and the scatter, rad."""
 
     at_s: float
     size: float
@@ -57,11 +57,11 @@ class PlaceStep:
 def find_turns(
     joints: Sequence[JointWindows], axes: Mapping[Segment, Floats], params: SlipParams
 ) -> dict[Segment, PlaceTurns]:
-    """How the places beside every sensor turn.
+    """Rotation of the joint positions around every sensor.
 
     Parameters
     ----------
-    joints : with the windows that speak (`is_moving`). axes : sensor → axis it turns about most (3,).
+    joints : with usable windows (`is_moving`). axes : sensor → main rotation axis (3,).
     """
     found = {s: _find_place_turns(s, joints, axis, params) for s, axis in axes.items()}
     return {s: x for s, x in found.items() if x is not None}
@@ -70,11 +70,11 @@ def find_turns(
 def judge_turns(
     turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams, since_s: float = -np.inf
 ) -> dict[Segment, PlaceStep]:
-    """Sensor → when its places turned for good, while those of the others did not.
+    """Sensor → time of a lasting rotation of its joint positions without one of the other sensors.
 
     Parameters
     ----------
-    half : of a window's width, s. since_s : moments before are not asked for.
+    half : half a window width, s. since_s : earlier moments are ignored.
     """
     steps: dict[Segment, PlaceStep] = {}
     for segment, found in turns.items():
@@ -92,7 +92,7 @@ def _find_place_turns(
     axis: Floats,
     params: SlipParams,
 ) -> PlaceTurns | None:
-    """Turns of the places from where they typically lie, of windows in which all its joints speak."""
+    """Rotations of the joint positions from their typical ones, for windows usable at all its joints."""
     own = [w for w in joints if segment in (w.first, w.second)]
     # one joint alone says too little, except at a foot, which has no other
     if not own or (len(own) < 2 and not segment.startswith("foot")):
@@ -109,8 +109,9 @@ def _find_place_turns(
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def turn_places(V, axis):  # type: ignore[no-untyped-def]
-    """Turns (m,) about an axis (3,) of places V (m, joints, 3) from their median, and the places across the
-    axis turned back by them."""
+    """Rotations (m,) about an axis (3,) of positions V (m, joints, 3) from their median, and the positions
+    perpendicular to the axis rotated back by them.
+    """
     m, joints = V.shape[:2]
     x, y, z = axis
     across, back = np.empty(V.shape), np.empty(V.shape)
@@ -144,20 +145,20 @@ def turn_places(V, axis):  # type: ignore[no-untyped-def]
 def measure_step(
     found: PlaceTurns, at_s: float, half: float, floor: float, reach: float = np.inf
 ) -> tuple[float, float] | None:
-    """Turn between windows wholly before and wholly after a moment, and its standard deviation."""
+    """Rotation between windows entirely before and entirely after a moment, and its standard deviation."""
     size, sd = _compare_sides(found.t_s, found.turn, found.step_s, at_s, half, floor, reach)
     return None if np.isnan(size) else (size, sd)
 
 
 def is_lasting(found: PlaceTurns, at_s: float, turn_rad: float, half: float, params: SlipParams) -> bool:
-    """Whether what turned at a moment is still turned; also where no window from before is left."""
+    """Whether a rotation persists; also true if no earlier window is left for comparison."""
     measured = measure_step(found, at_s, half, params.floor_rad)
     return measured is None or measured[0] / turn_rad >= params.lasting
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _compare_sides(t_s, turn, step_s, at_s, half, floor, reach):  # type: ignore[no-untyped-def]
-    """Difference of the medians of both sides and its spread; not a number where a side has no window."""
+    """Difference of the medians before and after, and its spread; NaN if either has no window."""
     before = turn[(t_s <= at_s - half) & (t_s >= at_s - reach)]
     after = turn[(t_s >= at_s + half) & (t_s <= at_s + reach)]
     if len(before) == 0 or len(after) == 0:
@@ -170,7 +171,7 @@ def _compare_sides(t_s, turn, step_s, at_s, half, floor, reach):  # type: ignore
 
 
 def _find_best_step(found: PlaceTurns, half: float, params: SlipParams, since_s: float) -> PlaceStep | None:
-    """The moment before and after which the places differ most clearly, for good; None below the limits."""
+    """The moment with the clearest lasting change of the joint positions; None below the limits."""
     best, most = None, 0.0
     least = params.least_windows
     first, last = max(found.t_s[least - 1] + half, since_s), found.t_s[-least] - half
@@ -191,7 +192,7 @@ def _find_best_step(found: PlaceTurns, half: float, params: SlipParams, since_s:
 def _find_moment(
     found: PlaceTurns, step: PlaceStep, half: float, moments: Floats, params: SlipParams
 ) -> float:
-    """When the turn was: windows that contain it show a share of it, so that it is a ramp of their width."""
+    """Time of the rotation: windows that contain it show part of it, which makes a ramp of their width."""
     best, least = step.at_s, np.inf
     near = np.abs(found.t_s - step.at_s) <= params.near_s
     t, x = found.t_s[near], found.turn[near]
@@ -208,7 +209,9 @@ def _find_moment(
 
 
 def _is_likely(found: PlaceTurns, moments: Floats, half: float, least: float) -> Bools:
-    """Moments at which the mean turn before and after differs by more than least: quick to tell."""
+    """Moments with a difference of the mean rotation before and after above a minimum: a fast
+    preselection.
+    """
     total = np.concatenate(([0.0], np.cumsum(found.turn)))
     a = np.searchsorted(found.t_s, moments - half + 1e-9)
     b = np.searchsorted(found.t_s, moments + half - 1e-9)
@@ -220,7 +223,7 @@ def _is_likely(found: PlaceTurns, moments: Floats, half: float, least: float) ->
 def _is_alone(
     segment: Segment, step: PlaceStep, turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
 ) -> bool:
-    """Whether the other sensors stay where they are at that moment; a change of gait turns several."""
+    """Whether the other sensors remain stable at that moment; a change of gait rotates several."""
     others = []
     for other, found in turns.items():
         if other == segment:
@@ -232,7 +235,7 @@ def _is_alone(
 
 
 def _measure_misfit(found: PlaceTurns, step: PlaceStep, half: float) -> float:
-    """What a turn does not carry from before to after, of the size of the places."""
+    """Relative change of the joint positions that is not explained by the rotation."""
     before = np.median(found.places[found.t_s <= step.at_s - half], axis=0)
     after = np.median(found.places[found.t_s >= step.at_s + half], axis=0)
     size = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))

@@ -1,4 +1,4 @@
-"""Signals of a late sensor laid where they belong, and of a slipped one turned back."""
+"""Correction of the signals of late sensors by a time shift, and of slipped sensors by a rotation."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from sagittal.core.timeline.params import TimelineParams
 def take_lag_out(
     signals: SensorSignals, t_s: Floats, lag_s: Floats, rate_hz: float, params: TimelineParams
 ) -> SensorSignals:
-    """Lay a sensor that is late by lag_s (n,) at its own samples where they belong.
+    """Shift the samples of a sensor that is late by lag_s (n,) to their correct times.
 
-    Samples are interpolated as those of any sensor whose times do not fall on the axis
-    (docs/science/timeline.md, "Rule"); where the shift leaves none, the sensor is not valid.
+    Samples are interpolated like those of any sensor whose times do not coincide with the axis
+    (docs/science/timeline.md, "Rule"); samples without data after the shift are invalid.
     """
     ok, n = signals.valid, len(t_s)
     own = np.asarray(t_s - lag_s)[ok]
@@ -50,9 +50,9 @@ SLIPPING_S: Final = 0.3
 
 
 def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSignals:
-    """Turn back what a sensor showed after it slipped, and take the slip itself out of its rate.
+    """Rotate the signals of a sensor back after a slip, and remove the slip itself from its rate.
 
-    The gyroscope measured that turn; left in, the orientation integrated from it would be wrong by the slip.
+    The gyroscope measured that rotation; left in, the integrated orientation would be wrong by the slip.
     """
     turn = slip.turn_rad * np.array(slip.axis)
     after = t_s >= slip.at_s
@@ -70,6 +70,6 @@ def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSi
 
 
 def leave_out(signals: SensorSignals, t_s: Floats, doubtful: Window) -> SensorSignals:
-    """The sensor as one that does not measure while nobody knows how it sits."""
+    """Mark a sensor invalid while its alignment is uncertain."""
     valid = signals.valid & ~((t_s >= doubtful[0]) & (t_s <= doubtful[1]))
     return signals.change(valid=valid, interpolated=signals.interpolated & valid)

@@ -1,9 +1,9 @@
-"""A sensor that slips on its segment: which, when, by how much about the axis across.
+"""Detection of sensor slip: which sensor, when, and by what angle about the medio-lateral axis.
 
-The joints next to a sensor lie where they lie in its axes, whatever the gait or posture. A slip turns
-them all by one rotation (the judge). Strides, each by itself, show when, and do not deny it (the witness): a
-change of gait turns those too, so that alone they are no proof.
-Equations: docs/science/agreement.md, "Slipped sensors".
+The positions of the adjacent joints in sensor axes do not depend on gait or posture. A slip rotates them all
+by the same rotation (primary criterion). Each single stride gives the time and must not contradict the slip
+(confirmation): a change of gait rotates strides too, so they are no proof on their own. Equations:
+docs/science/agreement.md, "Slipped sensors".
 """
 
 from __future__ import annotations
@@ -40,9 +40,10 @@ class SensorSlip:
 
     Parameters
     ----------
-    at_s, within_s : when, and half the width of what is left out. turn_rad : about `axis` (3,) in sensor
-        axes: what the sensor shows afterwards = that turn of what it would have shown. sd_rad : of it.
-    at_rest : seen by two standings (standings.py), so that the moment is not known well enough to turn back.
+    at_s, within_s : time, and half the width of the excluded period. turn_rad : about `axis` (3,) in sensor
+        axes: signals after the slip = this rotation of the signals without it. sd_rad : of it.
+    at_rest : detected from two standing periods (standings.py), so that the time is too uncertain for a
+        correction.
     """
 
     segment: Segment
@@ -55,7 +56,7 @@ class SensorSlip:
 
     @property
     def is_repaired(self) -> bool:
-        """Whether what follows is turned back."""
+        """Whether later samples are corrected."""
         return self.segment.startswith(REPAIRED) and not self.at_rest
 
 
@@ -65,11 +66,11 @@ def find_slips(
     joints: Sequence[JointWindows],
     params: SlipParams,
 ) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
-    """The slips that pass all limits, at most one a sensor; sensor → from when to when one would be seen.
+    """The slips that pass all limits, at most one per sensor; sensor → period in which one would be detected.
 
     Parameters
     ----------
-    terms, joints : of a recording whose late sensors were shifted.
+    terms, joints : of a recording with lags corrected.
     """
     rate_hz = recording.rate_hz
     axes: dict[Segment, Floats] = {}
@@ -93,7 +94,9 @@ def find_slips(
 def _find_judged(
     turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
 ) -> dict[Segment, Window]:
-    """Moments with windows enough wholly before and after, of sensors where that is most of the walk."""
+    """Moments with enough windows entirely before and after, for sensors where these cover most of the
+    walk.
+    """
     judged, least = {}, params.least_windows
     for segment, t_s in ((s, x.t_s) for s, x in turns.items()):
         start, end = float(t_s[least - 1]) + half, float(t_s[-least]) - half
@@ -103,7 +106,7 @@ def _find_judged(
 
 
 def is_moving(w: JointWindows, swing: Mapping[Segment, Floats], params: SlipParams) -> Bools:
-    """Windows (m,) in which the leg sensors of a joint swing as in walking, and the joint fits.
+    """Windows (m,) in which the leg sensors of a joint swing as in walking, and the joint misfit is small.
 
     Parameters
     ----------
@@ -139,11 +142,12 @@ def question_strides(
     half: float,
     params: SlipParams,
 ) -> SensorSlip | None:
-    """What single strides say of it: when it was, None where they deny it or it is too small without them.
+    """Confirm a slip by single strides: its time, None if they contradict it or it is too small without
+    confirmation.
 
     Parameters
     ----------
-    step : its time is counted from the first sample of `motions`. valid : (n,) samples of the sensor.
+    step : its time is relative to the first sample of `motions`. valid : (n,) samples of the sensor.
     """
     at, within = step.at_s, half
     share = None
@@ -180,7 +184,7 @@ def question_strides(
 
 
 def compile_agreement_kernels() -> None:
-    """Compile the kernels or load them, so that the first recording does not wait for them."""
+    """Compile the kernels or load them from the cache, so that the first recording is not delayed."""
     n = 1000
     # single precision, as sensors give it: then arrays are of the kind that takes have
     wave = np.random.default_rng(0).normal(size=(2, n, 3)).astype(np.float32).astype(np.float64)

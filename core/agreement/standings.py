@@ -1,10 +1,9 @@
-"""A sensor that slipped before or as the walk begins: standing before and after it, and the walk between.
+"""Detection of slips before or at the start of walking, from standing before and after and the walk between.
 
-The judge of slips.py needs windows of walking on both sides. At the edges of a walk three tilts speak:
-standing before, walking, standing after. A slip between the first two turns both others from the first, of
-this sensor alone. A leg put forward turns thigh and shank alike, a bent knee both; a limp turns the walk and
-not the standing after it.
-Equations: docs/science/agreement.md, "Slipped sensors".
+The criterion of slips.py needs windows of walking before and after. At the edges of a walk three tilts are
+compared: standing before, walking, standing after. A slip between the first two rotates both others relative
+to the first, for this sensor alone. A leg placed forward tilts thigh and shank alike, a bent knee both; a
+limp affects walking but not the standing after it. Equations: docs/science/agreement.md, "Slipped sensors".
 """
 
 from __future__ import annotations
@@ -41,12 +40,13 @@ MIRRORED: Final[Mapping[Segment, Segment]] = {
 
 @dataclass(frozen=True)
 class StandingTurn:
-    """Turn of a sensor about its axis across from the standing before a walk, forward positive, rad.
+    """Rotation of a sensor about its medio-lateral axis since the standing before a walk, forward positive,
+    rad.
 
     Parameters
     ----------
-    walking : to the mean of the walk, beyond that of the other leg. standing : to the standing after it, of
-        a thigh and a shank beyond each other: the change of the knee. axis : (3,) in sensor axes.
+    walking : to the mean of the walk, relative to the other leg. standing : to the standing after it, thigh
+        and shank relative to each other, i.e. the change of the knee angle. axis : (3,) in sensor axes.
     """
 
     walking: float
@@ -57,9 +57,9 @@ class StandingTurn:
 def compare_standings(
     recording: UniformRecording, terms: Mapping[Segment, SensorTerms], params: SlipParams
 ) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
-    """Slips before the walk, at most one a sensor; and sensor → from when to when it surely did not slip.
+    """Slips before the walk, at most one per sensor; and sensor → period in which it certainly did not slip.
 
-    Both only where people stood before and after a walk, and for sensors that both legs wear.
+    Both require standing before and after a walk, and sensors on the same segments of both legs.
     """
     legs = tuple(s for s in terms if s != "pelvis")
     slips: dict[Segment, SensorSlip] = {}
@@ -83,7 +83,7 @@ def compare_standings(
 
 
 def _has_slipped(segment: Segment, turns: Mapping[Segment, StandingTurn], params: SlipParams) -> bool:
-    """Whether walk and standing after it both lie where one turn of this sensor alone brings them."""
+    """Whether walking and the standing after it are both explained by one rotation of this sensor alone."""
     x, side = turns[segment], segment[-1]
     size, same = abs(x.standing), x.walking * np.sign(x.standing)
     if not (
@@ -148,7 +148,9 @@ def _measure_turns(
 
 
 def _find_forward_axis(rate: Floats, shank: Floats, rate_hz: float) -> Floats:
-    """Axis (3,) about which a sensor turns most, positive in swing, as that of its shank; rates (n, 3)."""
+    """Axis (3,) of the largest rotation of a sensor, positive in swing like that of its shank; rates (n,
+    3).
+    """
     axis, along = find_main_axis(rate), find_main_axis(shank)
     leg = low_pass(shank @ along, SMOOTH_HZ, rate_hz)
     # a shank swings forward faster than it turns back

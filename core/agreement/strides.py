@@ -1,4 +1,4 @@
-"""Strides of a leg sensor without calibration, and how it sits in each of them."""
+"""Strides of a leg sensor without calibration, and its orientation on the segment in each of them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ POINTS: Final = 40
 
 @dataclass(frozen=True, eq=False)
 class StrideTurns:
-    """How a sensor sits in each stride: start_s, end_s (k,); turn (k, 3) rad from how it sits typically."""
+    """Sensor rotation per stride: start_s, end_s (k,); turn (k, 3) rad relative to its typical alignment."""
 
     start_s: Floats
     end_s: Floats
@@ -42,17 +42,19 @@ class StrideTurns:
 
 
 def find_main_axis(rate: Floats) -> Floats:
-    """Unit axis (3,) about which a sensor turns most; rate (n, 3) rad/s."""
+    """Unit axis (3,) of the largest rotation of a sensor; rate (n, 3) rad/s."""
     return find_largest_axis(rate.T @ rate)
 
 
 def find_largest_axis(moments: Floats) -> Floats:
-    """The same from the sum of products (3, 3) of its rate."""
+    """Unit axis (3,) of the largest rotation from the sum of products (3, 3) of the rate."""
     return np.ascontiguousarray(np.linalg.eigh(moments)[1][:, -1])
 
 
 def find_swings(rate: Floats, rate_hz: float) -> NDArray[np.int64]:
-    """Samples (k,) of the mid-swings of a leg: peaks of the rate about its main axis, the larger lobe up."""
+    """Mid-swing samples (k,) of a leg: peaks of the rate about its main axis, with the larger lobe
+    positive.
+    """
     x = low_pass(rate @ find_main_axis(rate), SMOOTH_HZ, rate_hz)
     low, high = np.percentile(x, (2, 98))
     x, top = (x, high) if high >= -low else (-x, -low)
@@ -62,7 +64,7 @@ def find_swings(rate: Floats, rate_hz: float) -> NDArray[np.int64]:
 
 
 def choose_leg(segment: Segment) -> tuple[Segment, ...]:
-    """Sensors whose swings cut the strides of this one, best first."""
+    """Sensors whose swings delimit the strides of this one, best first."""
     sides = ("r", "l") if segment == "pelvis" else (segment[-1],)
     return tuple(f"{part}_{side}" for side in sides for part in ("shank", "foot", "thigh"))  # type: ignore[misc]
 
@@ -70,10 +72,10 @@ def choose_leg(segment: Segment) -> tuple[Segment, ...]:
 def find_stride_turns(
     motion: SensorMotion, valid: Bools, borders: NDArray[np.int64], rate_hz: float, params: SlipParams
 ) -> StrideTurns:
-    """Fit each stride's curve of vertical and rate to the typical one by a rotation.
+    """Rotation that best aligns the vertical and rate curves of each stride with the typical stride.
 
-    The vertical of a stride is its mean specific force; how the sensor turns within it is integrated from its
-    start, so that nothing of the strides before enters.
+    The vertical of a stride is its mean specific force; the orientation within it is integrated from its
+    start, so that earlier strides have no influence.
     """
     length = np.diff(borders)
     usual = float(np.median(length)) if len(length) else 0.0
@@ -106,7 +108,7 @@ def find_stride_turns(
 
 
 def _fit_rotation(P: Floats, Q: Floats) -> Floats:
-    """Rotation vectors (k, 3) that carry P (m, 3) best to each of Q (k, m, 3) (Wahba, by singular values)."""
+    """Rotation vectors (k, 3) that best align P (m, 3) with each of Q (k, m, 3) (Wahba's problem, by SVD)."""
     U, _, Vt = np.linalg.svd(np.einsum("kmi,mj->kij", Q, P))
     U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
     R = U @ Vt

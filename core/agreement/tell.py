@@ -1,4 +1,4 @@
-"""Words for what the sensors say about each other."""
+"""Messages of the consistency checks between sensors."""
 
 from __future__ import annotations
 
@@ -12,68 +12,93 @@ from sagittal.core.agreement.lags import SensorDrift, SensorLag
 from sagittal.core.agreement.params import ExchangeParams, LagParams, SlipParams
 from sagittal.core.agreement.slips import SensorSlip
 from sagittal.core.errors import Notice
+from sagittal.core.message import Message
 
 KEPT: Final = "The recording itself keeps its own times."
 
 
 def say_lag(lag: SensorLag) -> str:
-    """Whose clock is late, by how much."""
+    """Message about a late clock."""
     ms, sd = 1e3 * abs(lag.lag_s), 1e3 * lag.sd_s
     verb, which = "is" if lag.sure else "seems", "late" if lag.lag_s > 0 else "early"
-    return f"The clock of {list_sensors(lag.sensors)} {verb} {ms:.0f} ± {sd:.0f} ms {which}"
+    return Message(
+        "The clock of {sensors} {verb} {ms:.0f} ± {sd:.0f} ms {which}",
+        sensors=list_sensors(lag.sensors),
+        verb=verb,
+        ms=ms,
+        sd=sd,
+        which=which,
+    )
 
 
 def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
-    """Say whose clock is late, and what was done about it."""
+    """Notice about a late clock and its correction."""
     said = say_lag(lag)
     if not lag.sure:
         return Notice(
             "clocks_disagree",
-            f"{said}. One joint alone shows it, so nothing was shifted. Synchronise the sensors and record "
-            "again.",
+            Message(
+                "{said}. One joint alone shows it, so nothing was shifted. Synchronise the sensors "
+                "and record again.",
+                said=said,
+            ),
             lag.sensors[0],
         )
     if not params.repair:
         return Notice(
             "sensor_late",
-            f"{said}. It was left so, as this analysis was told to. Angles beside it are wrong.",
+            Message(
+                "{said}. It was left so, as this analysis was told to. Angles beside it are wrong.", said=said
+            ),
             lag.sensors[0],
         )
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            f"{said}; its samples were shifted by that. " + KEPT,
+            Message("{said}; its samples were shifted by that. {KEPT}", said=said, KEPT=KEPT),
             lag.sensors[0],
             severity="info",
         )
     return Notice(
         "sensor_late",
-        f"{said}; its samples were shifted by that. Synchronise the sensors before the next take. " + KEPT,
+        Message(
+            "{said}; its samples were shifted by that. Synchronise the sensors before the next take. {KEPT}",
+            said=said,
+            KEPT=KEPT,
+        ),
         lag.sensors[0],
     )
 
 
 def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
-    """Say whose clock runs slow or fast."""
+    """Notice about a clock that runs slow or fast."""
     ms, sd = 1e3 * abs(drift.change_s), 1e3 * drift.sd_s
     which = "slow" if drift.change_s > 0 else "fast"
     done = "its samples were laid where they belong. " if params.repair else "it was left so. "
     return Notice(
         "clock_drifts",
-        f"The clock of {drift.sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}"
-        "Synchronise the sensors before the next take. " + KEPT,
+        Message(
+            "The clock of {sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}Synchronise "
+            "the sensors before the next take. {KEPT}",
+            sensor=drift.sensor,
+            which=which,
+            ms=ms,
+            sd=sd,
+            done=done,
+            KEPT=KEPT,
+        ),
         drift.sensor,
     )
 
 
 def say_exchange(exchange: SensorExchange) -> str:
-    """Which sensors were put on each other's segments."""
+    """Message about swapped sensors."""
     whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
-    return f"The joints show that sensors are exchanged: {whose}."
+    return Message("The joints show that sensors are exchanged: {whose}.", whose=whose)
 
 
 def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
-    """Say which sensors were put on each other's segments."""
+    """Notice about swapped sensors."""
     done = (
         "The take was analysed with them the right way round. Look who wears what and correct it."
         if params.repair
@@ -81,58 +106,73 @@ def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
     )
     return Notice(
         "sensors_exchanged",
-        f"{say_exchange(exchange)} {done}",
+        Message("{exchange} {done}", exchange=say_exchange(exchange), done=done),
         exchange.swap[0][0],
     )
 
 
 def say_slip(slip: SensorSlip) -> str:
-    """Which sensor slipped, when and how far."""
+    """Message about a slipped sensor, with time and angle."""
     angle, sd = np.degrees(abs(slip.turn_rad)), np.degrees(slip.sd_rad)
     if slip.at_rest:
-        return (
-            f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° before the walk at "
-            f"{slip.at_s + slip.within_s:.0f} s, or its leg stood otherwise before than after it."
+        return Message(
+            "The sensor on {segment} slipped by {angle:.0f} ± {sd:.0f}° before the walk at {at_s:.0f} s, or "
+            "its leg stood otherwise before than after it.",
+            segment=slip.segment,
+            angle=angle,
+            sd=sd,
+            at_s=slip.at_s + slip.within_s,
         )
-    return f"The sensor on {slip.segment} slipped by {angle:.0f} ± {sd:.0f}° about {slip.at_s:.0f} s."
+    return Message(
+        "The sensor on {segment} slipped by {angle:.0f} ± {sd:.0f}° about {at_s:.0f} s.",
+        segment=slip.segment,
+        angle=angle,
+        sd=sd,
+        at_s=slip.at_s,
+    )
 
 
 def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
-    """Say which sensor slipped, when, how far, and what follows from it."""
+    """Notice about a slipped sensor, with time, angle and consequences."""
     if not params.repair:
         done = "It was left so, as this analysis was told to. Angles beside it are withheld from there on."
     elif slip.at_rest:
         done = "It is left out, as if it were not worn. Fasten it and record again."
     elif slip.is_repaired:
-        done = (
-            f"Angles beside it are left out within {slip.within_s:.0f} s of that; what came after was turned "
-            "back. Fasten it before the next take."
+        done = Message(
+            "Angles beside it are left out within {within_s:.0f} s of that; what came after was "
+            "turned back. Fasten it before the next take.",
+            within_s=slip.within_s,
         )
     else:
-        done = (
-            f"From {max(slip.at_s - slip.within_s, 0.0):.0f} s on it is left out, as if it were not worn. "
-            "Fasten it and record again."
+        done = Message(
+            "From {max:.0f} s on it is left out, as if it were not worn. Fasten it and record again.",
+            max=max(slip.at_s - slip.within_s, 0.0),
         )
     return Notice(
         "sensor_slipped",
-        f"{say_slip(slip)} {done}",
+        Message("{slip} {done}", slip=say_slip(slip), done=done),
         slip.segment,
         slip.at_s,
     )
 
 
 def tell_left_over(lag: SensorLag) -> Notice:
-    """Say that a lag is left after the repair."""
+    """Notice about a lag that remains after correction."""
     return Notice(
         "clocks_disagree",
-        f"After the repair {list_sensors(lag.sensors)} still seems {1e3 * abs(lag.lag_s):.0f} ms off the "
-        "others. Angles beside it are doubtful; synchronise the sensors and record again.",
+        Message(
+            "After the repair {sensors} still seems {abs:.0f} ms off the others. Angles beside "
+            "it are doubtful; synchronise the sensors and record again.",
+            sensors=list_sensors(lag.sensors),
+            abs=1e3 * abs(lag.lag_s),
+        ),
         lag.sensors[0],
     )
 
 
 def list_sensors(sensors: Sequence[str]) -> str:
-    """Name sensors in a sentence.
+    """List sensors in a sentence.
 
     >>> list_sensors(["thigh_l", "shank_l", "foot_l"])
     'thigh_l, shank_l and foot_l'

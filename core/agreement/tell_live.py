@@ -1,4 +1,4 @@
-"""Words for the same while samples come: nothing is repaired yet, the analysis of the take does that."""
+"""Messages of the streaming consistency checks: nothing is corrected until the recording is analysed."""
 
 from __future__ import annotations
 
@@ -10,51 +10,68 @@ from sagittal.core.agreement.params import LagParams
 from sagittal.core.agreement.slips import SensorSlip
 from sagittal.core.agreement.tell import list_sensors, say_exchange, say_lag, say_slip
 from sagittal.core.errors import Notice
+from sagittal.core.message import Message
 
 AGAIN: Final = "sensors_agree_again"
 
+RESOLVED: Final = {
+    "sensors_exchanged": "The sensors of {sensors} fit where they are worn now.",
+    "sensor_slipped": "The sensor on {sensors} sits as it did before it slipped.",
+}
+"""Code of a notice → what is said when it no longer holds."""
+
+CLOCK_AGREES: Final = "The clock of {sensors} agrees with the others now."
+"""What is said when a clock that was late no longer is."""
+
 
 def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
-    """Say whose clock is late."""
+    """Notice about a late clock."""
     if not lag.sure:
         todo = "One joint alone shows it. Synchronise the sensors and record again."
-        return Notice("clocks_disagree", f"{say_lag(lag)}. {todo}", lag.sensors[0], t_s)
+        return Notice(
+            "clocks_disagree", Message("{lag}. {todo}", lag=say_lag(lag), todo=todo), lag.sensors[0], t_s
+        )
     todo = "Angles beside it are wrong while they are shown live; the analysis of the take puts them right."
     if abs(lag.lag_s) <= params.warn_s:
-        return Notice("sensor_late", f"{say_lag(lag)}. {todo}", lag.sensors[0], t_s, "info")
+        return Notice(
+            "sensor_late", Message("{lag}. {todo}", lag=say_lag(lag), todo=todo), lag.sensors[0], t_s, "info"
+        )
     return Notice(
         "sensor_late",
-        f"{say_lag(lag)}. {todo} Synchronise the sensors before the next take.",
+        Message("{lag}. {todo} Synchronise the sensors before the next take.", lag=say_lag(lag), todo=todo),
         lag.sensors[0],
         t_s,
     )
 
 
 def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
-    """Say which sensors were put on each other's segments."""
+    """Notice about swapped sensors."""
     return Notice(
         "sensors_exchanged",
-        f"{say_exchange(exchange)} The live figure is wrong; the analysis of the take puts it right. Correct "
-        "who wears what and calibrate again.",
+        Message(
+            "{exchange} The live figure is wrong; the analysis of the take puts it right. "
+            "Correct who wears what and calibrate again.",
+            exchange=say_exchange(exchange),
+        ),
         exchange.swap[0][0],
         t_s,
     )
 
 
 def tell_slip_now(slip: SensorSlip) -> Notice:
-    """Say which sensor slipped, when and how far."""
+    """Notice about a slipped sensor, with time and angle."""
     return Notice(
         "sensor_slipped",
-        f"{say_slip(slip)} Angles beside it are wrong from there on. Fasten the sensor and calibrate again.",
+        Message(
+            "{slip} Angles beside it are wrong from there on. Fasten the sensor and calibrate again.",
+            slip=say_slip(slip),
+        ),
         slip.segment,
         slip.at_s,
     )
 
 
 def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
-    """Say that what was told holds no more."""
-    what = {
-        "sensors_exchanged": "The sensors of {} fit where they are worn now.",
-        "sensor_slipped": "The sensor on {} sits as it did before it slipped.",
-    }.get(told.code, "The clock of {} agrees with the others now.")
-    return Notice(AGAIN, what.format(list_sensors(sensors)), told.sensor, t_s, "info")
+    """Notice that an earlier notice no longer holds."""
+    what = RESOLVED.get(told.code, CLOCK_AGREES)
+    return Notice(AGAIN, Message(what, sensors=list_sensors(sensors)), told.sensor, t_s, "info")

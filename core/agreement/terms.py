@@ -1,7 +1,7 @@
-"""What one sensor says of any point of its segment: the terms of that point's acceleration, band-passed.
+"""Terms of the acceleration of any point of a segment from one sensor, band-passed.
 
-A point at r in the sensor's axes has the specific force f + K r with K = [ω̇]× + [ω]×[ω]×. Turned level by
-R (tilt by the complementary filter, heading free) that is R f + R K r: linear in the unknown r.
+A point at r in the sensor's axes has the specific force f + K r with K = [ω̇]× + [ω]×[ω]×. Levelled by R
+(tilt by the complementary filter, heading free) that is R f + R K r: linear in the unknown r.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ TERMS: Final = 4
 
 
 class SensorMotion(Protocol):
-    """How one sensor moves: of the arrays, or worked out each time it is asked for; see `LevelMotion`."""
+    """Motion of one sensor: from stored arrays or computed on demand; see `LevelMotion`."""
 
     @property
     def q(self) -> Floats:
@@ -42,12 +42,12 @@ class SensorMotion(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class LevelMotion:
-    """How one sensor moves, without calibration.
+    """Motion of one sensor, without calibration.
 
     Parameters
     ----------
     q : (n, 4) sensor to its level frame, whose heading is free. level : (3, n) specific force there, m/s².
-    rate : (n, 3) rad/s with the bias at rest taken off.
+    rate : (n, 3) rad/s, corrected for the bias at rest.
     """
 
     q: Floats
@@ -57,11 +57,12 @@ class LevelMotion:
 
 @dataclass(frozen=True, eq=False)
 class TiltedSensor:
-    """`LevelMotion` of a whole take, worked out each time: an hour of seven sensors has 206 MB.
+    """`LevelMotion` of a whole recording, computed on each access: storing it takes 206 MB for one hour of
+    seven sensors.
 
     Parameters
     ----------
-    bias : (3,) rad/s, its rate at rest. start, rest_norm : of the tilt, as `start_tilt` gives them.
+    bias : (3,) rad/s, its rate at rest. start, rest_norm : of the tilt, from `start_tilt`.
     """
 
     signals: SensorSignals
@@ -87,7 +88,7 @@ class TiltedSensor:
         return self.signals.gyr - self.bias
 
     def cut(self, part: slice) -> LevelMotion:
-        """Some of the samples; what is behind them is not worked out."""
+        """Part of the samples; later samples are not computed."""
         q = self._tilt(part.stop)[part]
         return LevelMotion(
             q, _find_level(q, self.signals.cut("acc", part)), self.signals.cut("gyr", part) - self.bias
@@ -101,12 +102,13 @@ class TiltedSensor:
 
 @dataclass(frozen=True, eq=False)
 class SensorTerms:
-    """One sensor's side of every joint, and how it moves at every sample of the take.
+    """One sensor's side of every joint, and its motion at every sample of the recording.
 
     Parameters
     ----------
-    M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up; of the first samples alone
-        once the joints of the take were compared (`keep_first`). usable : (m,) no lost sample is near.
+    M : (m, 3, 4) [R K | R f] in m/s² per m and m/s², x and y horizontal, z up; of the first samples only,
+        once the joints of the recording have been compared (`keep_first`). usable : (m,) no lost sample
+        nearby.
     rate_hz : of these samples.
     """
 
@@ -117,18 +119,18 @@ class SensorTerms:
 
     @property
     def is_whole(self) -> bool:
-        """There are terms of the whole take."""
+        """Whether the terms cover the whole recording."""
         return len(self.M) == len(self.usable)
 
     def keep_first(self, until_s: float) -> SensorTerms:
-        """Without the terms from then on: those of an hour of seven sensors are 123 MB."""
+        """A copy with only the first terms: those of one hour of seven sensors take 123 MB."""
         kept = min(len(self.M), max(0, int(until_s * self.rate_hz) + 2)) if until_s < np.inf else len(self.M)
         return self if kept == len(self.M) else replace(self, M=self.M[:kept].copy())
 
 
 @dataclass(frozen=True, eq=False)
 class TermsPart:
-    """`SensorTerms` of a part of a take; `motion` is of its samples as well."""
+    """`SensorTerms` of a part of a recording; `motion` covers the same samples."""
 
     motion: LevelMotion
     M: Floats
@@ -150,7 +152,7 @@ STEEPEST: Final = 4.0
 
 
 def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> SensorTerms:
-    """Tilt the sensor level and band-pass its terms."""
+    """Level a sensor and band-pass its terms."""
     bias = find_bias(signals, rate_hz)
     acc, gyr = signals.acc, signals.gyr - bias
     state, rest_norm = start_tilt(acc, signals.valid, rate_hz)
@@ -165,14 +167,14 @@ def find_terms(signals: SensorSignals, rate_hz: float, params: JointParams) -> S
 
 
 def find_thinning(rate_hz: float, params: JointBandParams) -> int:
-    """Every how many samples one is taken for the terms."""
+    """Decimation factor of the terms."""
     return max(1, int(rate_hz / params.working_hz + 0.3))
 
 
 def low_pass_terms(
     q: Floats, acc: Floats, gyr: Floats, rate_hz: float, params: JointBandParams, pad: int | None = None
 ) -> tuple[Floats, Floats]:
-    """Terms (k, 12, m) of k sensors below the band's upper edge, thinned, and their level force (k, 3, n).
+    """Terms (k, 12, m) of k sensors below the band's upper edge, decimated, and their level force (k, 3, n).
 
     Parameters
     ----------
@@ -191,13 +193,15 @@ def low_pass_terms(
 
 
 def take_mean_out(slow: Floats, rate_hz: float, params: JointBandParams, pad: int | None = None) -> Floats:
-    """Terms (k, m, 3, 4) within the band, from those below its upper edge (k, 12, m) at their own rate."""
+    """Terms (k, m, 3, 4) within the band, from those below its upper edge (k, 12, m) at the decimated
+    rate.
+    """
     slow = slow - low_pass(slow, params.band_hz[0], rate_hz, pad)
     return np.ascontiguousarray(slow.transpose(0, 2, 1)).reshape(len(slow), -1, 3, TERMS)
 
 
 def find_usable(valid: Bools, rate_hz: float) -> Bools:
-    """Samples (k, n) near which none of valid (n, k) was lost."""
+    """Samples (k, n) without lost samples nearby, from valid (n, k)."""
     near = round(NEAR_GAP_S * rate_hz)
     around = np.ones(2 * near + 1)
     # of a part shorter than that "same" would give too many
@@ -206,7 +210,7 @@ def find_usable(valid: Bools, rate_hz: float) -> Bools:
 
 
 def cut_terms(terms: SensorTerms, start_s: float, end_s: float) -> TermsPart:
-    """The same of a part of the take; times begin anew."""
+    """Terms of a part of the recording; times restart at zero."""
     thin = round(terms.motion.rate_hz / terms.rate_hz)
     first, last = (max(0, round(x * terms.rate_hz)) for x in (start_s, end_s))
     part, whole = slice(first, last), slice(first * thin, last * thin)
@@ -221,11 +225,11 @@ def _find_level(q: Floats, acc: Floats) -> Floats:
 
 
 def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = None) -> Floats:
-    """Mean rate (3,) rad/s around the quietest moment where the sensor is at rest, else zero.
+    """Mean rate (3,) rad/s around the quietest moment of a sensor at rest, zero if it never rests.
 
     Parameters
     ----------
-    quiet : of the sensor, None = it is measured.
+    quiet : quietness of the sensor, None = computed here.
     """
     quiet = quiet or measure_quietness(signals, rate_hz)
     calmest = int(np.argmin(np.where(quiet.quiet, quiet.gyro, np.inf)))
@@ -236,7 +240,9 @@ def find_bias(signals: SensorSignals, rate_hz: float, quiet: Quietness | None = 
 
 
 def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState, float]:
-    """Level a sensor by its first `START_S`, heading free: the filter's start, and the norm at rest."""
+    """Tilt of a sensor from its first `START_S`, heading free: initial state of the filter, and the norm
+    at rest.
+    """
     norm = float(np.median(find_lengths(acc[valid]))) if valid.any() else GRAVITY
     first = np.flatnonzero(valid)[: max(1, round(START_S * rate_hz))]
     up = acc[first].mean(axis=0) if len(first) else np.array([0.0, 0.0, 1.0])

@@ -1,8 +1,9 @@
-"""What two sensors say of the joint between them, window by window: lag, places, and how well it fits.
+"""Comparison of two sensors at their joint, window by window: lag, positions and misfit.
 
-In one window, at one lag, the places a and b of the joint in the axes of the two sensors and the turn d
-between their level frames minimise mean |A [a; 1] − Rz(d) B [b; 1]|² + ε² (|a|² + |b|²), A and B as in
-terms.py. Only sums of products over the window enter: they are made once per second and lag and added up.
+In one window, at one lag, the positions a and b of the joint in the axes of the two sensors and the rotation
+d between their level frames minimise mean |A [a; 1] − Rz(d) B [b; 1]|² + ε² (|a|² + |b|²), A and B as in
+terms.py. Only sums of products over the window are needed: they are computed once per second and lag and
+summed.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from sagittal.core.signals.inner import inner_njit
 
 @dataclass(frozen=True, eq=False)
 class JointWindows:
-    """One joint over the take; only windows in which somebody moved and nothing was lost.
+    """Windows of one joint over the recording; only those with movement and without lost samples.
 
     Parameters
     ----------
     first, second : its sensors. t_s : (m,) middles of the windows.
-    lag_s : (m,) time the second sensor is later than the first. certain : (m,) the least misfit lies
-        inside the range of lags. residual : (m,) misfit at that lag over the joint's acceleration.
-    places : (m, 6) the joint in the axes of first and second, m. turn : (m,) heading of the second level
+    lag_s : (m,) delay of the second sensor relative to the first. certain : (m,) the minimum misfit is inside
+        the range of lags. residual : (m,) misfit at that lag relative to the joint acceleration.
+    places : (m, 6) joint position in the axes of first and second, m. turn : (m,) heading of the second level
         frame in the first, rad. width_s : of a window. step_s : between windows.
     """
 
@@ -45,15 +46,15 @@ class JointWindows:
 
     @property
     def start_s(self) -> float:
-        """Where the first window begins, s; infinite without one."""
+        """Start of the first window, s; infinite without one."""
         return float(self.t_s[0]) - 0.5 * self.width_s if len(self.t_s) else np.inf
 
     def place_in(self, segment: Segment) -> Floats:
-        """(m, 3) the joint in the axes of one of the two sensors, m."""
+        """Position (m, 3) of the joint in the axes of one of the two sensors, m."""
         return self.places[:, :3] if segment == self.first else self.places[:, 3:]
 
     def choose(self, kept: Bools) -> JointWindows:
-        """The same joint with some of its windows (m,)."""
+        """The same joint restricted to some of its windows (m,)."""
         return JointWindows(
             self.first, self.second, self.t_s[kept], self.lag_s[kept], self.certain[kept],
             self.residual[kept], self.places[kept], self.turn[kept], self.width_s, self.step_s,
@@ -97,7 +98,7 @@ def read_windows(
     params: JointParams,
     step_s: float,
 ) -> JointWindows:
-    """Solved windows (m, 11), as `JointSums.solve` gives them, in seconds; t_s (m,) their middles."""
+    """Solved windows (m, 11) of `JointSums.solve` in seconds; t_s (m,) their middles."""
     return JointWindows(
         first=names[0],
         second=names[1],
@@ -140,21 +141,22 @@ class JointSums:
         )
 
     def add(self, part: slice, A: Floats, B: Floats, ok_a: Bools, ok_b: Bools, chunk: int) -> None:
-        """Add the products of A and B (n, 3, 4) to a part of the chunks, which holds zeros."""
+        """Add the products of A and B (n, 3, 4) to some of the chunks, which must be zero before."""
         widest = self.BB.shape[1] // 2
         _sum_products(
             A, B, ok_a, ok_b, chunk, widest, self.ok[part], self.AA[part], self.BB[part], self.AB[part]
         )
 
     def forget_first(self) -> None:
-        """Leave the first chunk out; the last one is empty then."""
+        """Drop the first chunk and append an empty one."""
         for x in (self.ok, self.AA, self.BB, self.AB):
             x[:-1] = x[1:]
             x[-1] = 0
 
     def solve(self, starts: NDArray[np.int64], chunk: int, params: JointSumParams) -> Floats:
-        """Windows (m, 11) from these chunks on: middle in chunks, lag in samples, certain, misfit, places,
-        turn; m of those that can be used."""
+        """Windows (m, 11) starting at these chunks: middle in chunks, lag in samples, certain, misfit,
+        positions, turn; m is the number of usable ones.
+        """
         width = params.window_chunks
         found = np.zeros((len(starts), 11))
         ridge = (params.noise_mps2 / params.place_sd_m) ** 2 / (chunk * width)
@@ -227,7 +229,9 @@ def _solve_six(N, h):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
-    """Places r (6,) and turn of one window at one lag, from a first turn; returns misfit² and turn."""
+    """Fit positions r (6,) and turn of one window at one lag, from an initial turn; returns misfit² and
+    turn.
+    """
     cost = 1e300
     for _ in range(12):
         c, s = np.cos(turn), np.sin(turn)
@@ -265,7 +269,9 @@ def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, ridge, found):  # type: ignore[no-untyped-def]
-    """Write middle (chunks), lag (samples), certain, residual, places of each window; returns how many."""
+    """Write middle (chunks), lag (samples), certain, residual, positions of each window; returns their
+    number.
+    """
     lags = BB.shape[1]
     mid = lags // 2
     wa = np.empty((TERMS, TERMS))

@@ -1,4 +1,4 @@
-"""Angles of single orientations in numpy, for readers of poses; whole signals go through `AngleKernel`."""
+"""Angles of single orientations in numpy, for readers of poses; whole signals use `AngleKernel`."""
 
 from __future__ import annotations
 
@@ -37,9 +37,10 @@ def pelvis_angles(q: Floats) -> tuple[Floats, Floats]:
 
 
 def compute_headings(orientations: Oriented) -> dict[str, Floats]:
-    """Course of pelvis and feet about the vertical, as `JointAngles.headings`; NaN where lost.
+    """Headings of pelvis and feet about the vertical, as `JointAngles.headings`; NaN where lost.
 
-    The pelvis turns with its medio-lateral axis, as in the decomposition above; a foot points with its own.
+    The pelvis heading is that of its medio-lateral axis, as in the decomposition above; a foot heading that
+    of the foot's medio-lateral axis.
     """
     found: dict[str, Floats] = {}
     for segment, axis in COURSE_AXES.items():

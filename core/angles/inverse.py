@@ -1,7 +1,7 @@
 """Joint angles → segment orientations: the inverse of sagittal.core.angles.
 
 R_distal = R_proximal Rz(a) Rx(b) Ry(c) down the leg, R_pelvis = R_neutral Ry(rotation) Rx(b) Rz(tilt), with
-the signs of sagittal.core.angles. Angles over a cycle are named without side, as in the curves of
+the signs of sagittal.core.angles. Angles over a cycle have names without side, as in the curves of
 sagittal.core.parameters and sagittal.core.norms: positive with that side up and that side forward.
 """
 
@@ -20,11 +20,11 @@ _NEUTRAL: Final = from_matrix(R_NEUTRAL)
 
 
 def pelvis_orientation(angles: Mapping[str, Floats], side: Side) -> Floats:
-    """Pelvis (n, 4) of somebody who walks along x, from the pelvis angles over the cycle of a side.
+    """Pelvis (n, 4) of a person walking along x, from the pelvis angles over the cycle of one side.
 
     Parameters
     ----------
-    angles : "pelvis_tilt", "pelvis_obliquity", "pelvis_rotation" → (n,) rad; one that is missing is 0.
+    angles : "pelvis_tilt", "pelvis_obliquity", "pelvis_rotation" → (n,) rad; missing angles are 0.
     """
     own = 1.0 if side == "right" else -1.0
     tilt, obliquity, turned = (
@@ -39,7 +39,7 @@ def leg_orientations(angles: Mapping[str, Floats], side: Side) -> dict[Segment, 
 
     Parameters
     ----------
-    angles : "hip_flexion" … "ankle_rotation" → (n,) rad; one that is missing is 0.
+    angles : "hip_flexion" … "ankle_rotation" → (n,) rad; missing angles are 0.
     """
     found: dict[Segment, Floats] = {}
     q = np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,7 +1,7 @@
-"""Joint angles, compiled: the one rule for a file and a live take.
+"""Joint angles, compiled: the same implementation for files and live recordings.
 
-A live push holds ten samples: there numpy costs ten times the arithmetic, and some of its functions round
-differently in a vector than alone. A file is one call over the whole take.
+A live push holds ten samples: at that size numpy has ten times the overhead of the arithmetic, and some of
+its functions round differently on vectors and scalars. A file is processed in one call.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def _measure(q, known, pelvis, ends, sign, zero, out):  # type: ignore[no-untype
 
 @dataclass(frozen=True, eq=False)
 class AngleKernel:
-    """Which angles some segments have, and their measurement.
+    """The joint angles available for a set of segments, and their computation.
 
     Parameters
     ----------
@@ -74,8 +74,10 @@ class AngleKernel:
 
         Parameters
         ----------
-        worn : segments with a sensor; angles between two of them are theirs. figure : segments of a figure
-            that knows more; the angles that lack a sensor are taken from it, both ends.
+        worn : segments with a sensor; angles between two of them are measured.
+        figure : segments of a pose estimate with more segments; angles that lack a sensor are computed from
+        it, both
+            ends.
         """
         sources = [({s: i for i, s in enumerate(worn)}, False),
                    ({s: len(worn) + i for i, s in enumerate(figure)}, True)]  # fmt: skip
@@ -112,7 +114,7 @@ class AngleKernel:
 
         Parameters
         ----------
-        zero : (names,) rad, what is taken off.
+        zero : (names,) rad, offset to subtract.
         """
         out = np.empty((len(q), len(self.names)))
         _measure(
@@ -123,18 +125,18 @@ class AngleKernel:
 
 
 def compile_angle_kernel() -> None:
-    """Compile the kernel or load it, so that the first take does not wait for it."""
+    """Compile the kernel or load it from the cache, so that the first recording is not delayed."""
     q = np.tile([1.0, 0.0, 0.0, 0.0], (1, 2, 1))
     AngleKernel.between(("pelvis", "thigh_l")).measure(q, np.ones((1, 2), np.bool_))
 
 
 def mean_angles(angles: Floats) -> Floats:
-    """Circular mean (k,) in rad of angles (T, k) over their finite samples; 0 where there is none."""
+    """Circular mean (k,) in rad of angles (T, k) over their finite samples; 0 if there are none."""
     finite = np.where(np.isfinite(angles), angles, 0.0)
     n = np.isfinite(angles)
     return np.asarray(np.arctan2((np.sin(finite) * n).sum(axis=0), (np.cos(finite) * n).sum(axis=0)))
 
 
 def subtract_zero(angles: Floats, zero: Floats | float) -> Floats:
-    """Angles (T, k) in rad over those of a zero (k,), or (T,) over one, −π to π."""
+    """Angles (T, k) in rad relative to a zero (k,), or (T,) relative to a scalar, −π to π."""
     return wrap_angle(np.asarray(angles - zero))

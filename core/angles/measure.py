@@ -1,4 +1,4 @@
-"""Orientations of a take → its joint angles, zeroed on standing (docs/science/joint-angles.md)."""
+"""Orientations of a recording → joint angles relative to standing (docs/science/joint-angles.md)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from sagittal.core.angles.kernel import AngleKernel, mean_angles, subtract_zero
 from sagittal.core.angles.result import SIGNS, JointAngles, list_leg_joints
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SIDES, SUFFIX, Bools, Floats, Posture
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import cut_blocks, give_pages_back, make_room
 from sagittal.core.signals.rest import Window, index_window
 
@@ -32,23 +33,24 @@ def measure_angles(
     posture: Posture = "standing",
     dropped: Collection[str] = (),
 ) -> JointAngles:
-    """Angles of every joint whose two segments are there, zeroed on the mean over a window.
+    """Angles of every joint with both segments available, zeroed on the mean over a window.
 
     Parameters
     ----------
     orientations : segment orientations in W.
     zero : window whose mean angles are subtracted, seconds.
-    poses : of an estimator that knows more segments than have a sensor. A joint that has not both its sensors
-        takes its angles from there; `diagnostics["estimated"]` names them.
-    standing_deg : goniometer angles of that standing; kept beside the angles, not added.
-    posture : what was done in that window. From the mean of walking no goniometer leads to the anatomical
-        zero.
-    dropped : angles taken from `poses` that nobody wants: they have a zero and notices, and are not held.
+    poses : pose estimate covering more segments than have a sensor. A joint without both sensors takes its
+    angles from it; `diagnostics["estimated"]` lists them.
+    standing_deg : goniometer angles in the same standing posture; stored with the angles, not added.
+    posture : activity in that window. With the mean of walking, goniometer angles cannot provide the
+    anatomical zero.
+    dropped : angles from `poses` that are not requested: their zero and notices are computed, their samples
+    are not stored.
 
     Returns
     -------
     JointAngles; a joint with a missing segment has no entry and a notice `joint_missing`, a joint whose |b|
-    passes 80° a notice `gimbal`, one without signal while standing is left out with `no_standing_zero`.
+    exceeds 80° a notice `gimbal`; a joint without signal while standing is omitted with `no_standing_zero`.
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
     standing = kernel.measure(*_stack(orientations, poses, index_window(zero, orientations.rate_hz)))
@@ -68,10 +70,12 @@ def measure_angles(
         give_pages_back((*held.values(), *(() if poses is None else poses.q.values())))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
-        message = (
-            f"{name}: no angle, its sensors have no signal while standing ({zero[0]:.1f} to {zero[1]:.1f} "
-            "s), so "
-            "there is no zero."
+        message = Message(
+            "{name}: no angle, its sensors have no signal while standing ({zero:.1f} to {zero2:.1f} "
+            "s), so there is no zero.",
+            name=name,
+            zero=zero[0],
+            zero2=zero[1],
         )
         notices.append(Notice("no_standing_zero", message, t_s=zero[0]))
     return JointAngles(
@@ -87,7 +91,9 @@ def measure_angles(
 
 
 def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tuple[Floats, Bools]:
-    """Orientations (n, S, 4) of the sensors' segments, then the figure's, and where known (n, S); a part."""
+    """Orientations (n, S, 4) of the sensor segments, then of the pose estimate, and validity (n, S); for a
+    slice.
+    """
     q = [x[part] for x in orientations.q.values()]
     known = [orientations.valid[s][part] for s in orientations.q]
     if poses is not None:
@@ -100,22 +106,25 @@ def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tupl
 
 
 def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> list[Notice]:
-    """A notice for every joint that has no angles."""
+    """One notice for every joint without angles."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
             if f"{SIGNS[joint][0][0]}_{SUFFIX[side]}" in kernel.names:
                 continue
             missing = [s for s in (proximal, distal) if s not in orientations.q]
-            message = (
-                f"{side} {joint}: no angles, no sensor on {' and '.join(missing)}; wear or map one there."
+            message = Message(
+                "{side} {joint}: no angles, no sensor on {missing}; wear or map one there.",
+                side=side,
+                joint=joint,
+                missing=" and ".join(missing),
             )
             notices.append(Notice("joint_missing", message, sensor=missing[0]))
     return notices
 
 
 def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice]:
-    """A notice for every joint whose frontal angle is beyond the limit; `locked` (n, names)."""
+    """One notice for every joint whose frontal angle exceeds the gimbal limit; `locked` (n, names)."""
     notices: list[Notice] = []
     for side in SIDES:
         for joint, _, _ in list_leg_joints(side):
@@ -124,9 +133,12 @@ def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice
                 continue
             beyond = locked[:, kernel.names.index(frontal)]
             if beyond.any():
-                message = (
-                    f"{side} {joint}: the frontal angle passes 80° in {beyond.mean():.1%} of the take; there "
-                    "flexion and rotation cannot be told apart; check which segment each sensor is on."
+                message = Message(
+                    "{side} {joint}: the frontal angle passes 80° in {mean:.1%} of the take; there flexion "
+                    "and rotation cannot be told apart; check which segment each sensor is on.",
+                    side=side,
+                    joint=joint,
+                    mean=beyond.mean(),
                 )
                 notices.append(Notice("gimbal", message, t_s=float(t_s[int(np.argmax(beyond))])))
     return notices

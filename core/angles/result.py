@@ -1,4 +1,4 @@
-"""Joint angles of a take: names, signs and what is kept beside the values."""
+"""Joint angles of a recording: names, signs and metadata."""
 
 from __future__ import annotations
 
@@ -40,16 +40,17 @@ class JointAngles:
         "knee_rotation_l", "ankle_dorsiflexion_l", "ankle_inversion_l", "ankle_rotation_l", right alike.
         Pelvis tilt: anterior positive. Pelvis obliquity: right side up is positive.
         Zero is the mean over the calibration's zero window.
-    zero_offset : name → rad that was subtracted (the raw standing angle).
-    zero : "standing", or "walking": nobody stood still and the angles start from their mean over straight
-        walking, so that they have a shape and a range and no level.
-    standing_deg : angles of that standing by goniometer, where somebody entered them; see
+    zero_offset : name → rad, the subtracted value (the raw standing angle).
+    zero : "standing", or "walking": there was no quiet standing and angles are relative to their mean over
+    straight walking, so their shape and range are meaningful but not their level.
+    standing_deg : goniometer angles in that posture, if entered; see
         `sagittal.core.subject.standing_angles`, and `sagittal.core.parameters.anatomical_zero`, which adds
         them back.
-    headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, from a
-        zero of its own; only of segments with a sensor. Its course over a stride means something.
-    withheld : angles that were taken out again → reason (`sagittal.core.angles.withheld`).
-    bounds : name → rad, the straight knee of a leg model: at it the angle is a limit and no measurement.
+    headings : "pelvis", "foot_l", "foot_r" → (n,) rad about the vertical, left positive, unwrapped, with an
+    arbitrary zero; only for segments with a sensor. Only changes within a stride are meaningful.
+    withheld : suppressed angles → reason (`sagittal.core.angles.withheld`).
+    bounds : name → rad, the straight knee of a leg model: at this value the angle is a model limit, not a
+    measurement.
     """
 
     t_s: Floats
@@ -65,6 +66,6 @@ class JointAngles:
 
     @property
     def estimated(self) -> frozenset[str]:
-        """Angles, with their side, that no two sensors measure."""
+        """Angles, with their side, that are not measured by two sensors."""
         told = self.diagnostics.get("estimated", ())
         return frozenset(str(name) for name in told) if isinstance(told, (tuple, list)) else frozenset()

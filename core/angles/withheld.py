@@ -1,9 +1,9 @@
-"""Angles and distances that a take's estimator cannot stand behind are not shown, and say why.
+"""Suppression of angles and distances from unreliable estimates.
 
-An estimator measures how well its result hangs together (core/body/health.py). Where that is bad, the angles
-of the joint concerned still look like angles; they are taken out with the reason `estimator_bad`. So are
-the distances of feet whose chain does not hang together; those of a foot whose path does not fit its own
-rests have the reason `path_bad`. What a model of the leg holds fixed is no result either and goes with
+Estimators report how consistent their result is (core/body/health.py). Where consistency is bad, the angles
+of the joint concerned would still look plausible; they are removed with the reason `estimator_bad`. So are
+distances of feet on an inconsistent chain; those of a foot whose path contradicts its own rest phases have
+the reason `path_bad`. Angles that a leg model holds constant are no results either and are removed with
 `fixed_by_model`.
 """
 
@@ -22,6 +22,7 @@ from sagittal.core.body.poses import Poses
 from sagittal.core.errors import Notice
 from sagittal.core.estimators import BY_METHOD
 from sagittal.core.frames import FOOT, SIDES, SUFFIX, Oriented, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.signals.rest import Window, find_runs
 
@@ -58,16 +59,16 @@ whose sensor was gone for 1 s can come back with another heading."""
 
 
 def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> JointAngles:
-    """Take out angles of joints whose estimator is bad and those that its leg model holds fixed.
+    """Suppress angles of joints whose estimate is bad and those held constant by the leg model.
 
     Parameters
     ----------
-    poses : with the health of the run. orientations : of the sensors: when they were lost.
+    poses : with the health checks of the run. orientations : of the sensors, for their periods of data loss.
 
     Returns
     -------
-    JointAngles without them; `withheld` has their reasons, `bounds` the straight knee of a leg model on which
-    an estimated knee can rest; a notice `angles_withheld` says which joints contradict each other.
+    JointAngles without them; `withheld` has their reasons, `bounds` the straight knee of a leg model that an
+    estimated knee cannot extend past; a notice `angles_withheld` names the inconsistent joints.
     """
     estimated = frozenset(map(str, angles.diagnostics.get("estimated", ())))  # type: ignore[call-overload]
     estimator = BY_METHOD.get(poses.method)
@@ -91,9 +92,10 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     notices = angles.notices
     if out:
         places = sorted({_place(name) for name in out})
-        message = (
-            f"Angles of {', '.join(places)} are withheld: the sensors contradict each other there. Check "
-            "sides, segments and mounting, then calibrate again."
+        message = Message(
+            "Angles of {places} are withheld: the sensors contradict each other there. Check sides, "
+            "segments and mounting, then calibrate again.",
+            places=", ".join(places),
         )
         notices = (*notices, Notice("angles_withheld", message))
     return replace(
@@ -106,11 +108,11 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
 
 
 def withhold_at_slips(angles: JointAngles, doubtful: Mapping[Segment, Window]) -> JointAngles:
-    """Take out the angles beside a sensor while nobody knows how it sits.
+    """Suppress the angles adjacent to a sensor while its alignment is uncertain after a slip.
 
     Parameters
     ----------
-    doubtful : sensor → stretch, s from recording start (core/agreement).
+    doubtful : sensor → period, s from recording start (core/agreement).
     """
     kept = dict(angles.angles)
     for side in SIDES:
@@ -125,12 +127,12 @@ def withhold_at_slips(angles: JointAngles, doubtful: Mapping[Segment, Window]) -
 
 
 def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
-    """Take out distances of feet whose paths the estimator cannot stand behind.
+    """Suppress distances of feet whose estimated paths are unreliable.
 
     Returns
     -------
-    PoseEstimate whose `feet` say so in `withheld`; a notice `distances_withheld` says which feet. On one
-    chain a joint that is wrong moves both feet.
+    PoseEstimate with the reasons in `feet.withheld` and a notice `distances_withheld` naming the feet. On a
+    single chain one wrong joint displaces both feet.
     """
     feet = posed.feet
     if feet is None:
@@ -147,7 +149,12 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
         if chain
         else ("the path does not fit its rests on the floor", "Fasten the sensor and check for lost samples")
     )
-    message = f"Distances of {whose} are withheld: {why}. {todo}, then record again."
+    message = Message(
+        "Distances of {whose} are withheld: {why}. {todo}, then record again.",
+        whose=whose,
+        why=why,
+        todo=todo,
+    )
     notices = (*posed.poses.notices, Notice("distances_withheld", message))
     return replace(
         posed,
@@ -157,7 +164,7 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
 
 
 def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
-    """Names of the angles that a bad finding spoils."""
+    """Names of the angles affected by a bad health check."""
     of = f.of or ""
     if f.name in OF_JOINT or f.name in OF_SEGMENT:
         ends = set(of.split("-"))
@@ -175,7 +182,7 @@ def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
 
 
 def list_fixed(poses: Poses) -> frozenset[str]:
-    """Angles that the estimator's model of the leg holds fixed, where no two sensors measure them."""
+    """Angles held constant by the estimator's leg model, where they are not measured by two sensors."""
     estimator = BY_METHOD.get(poses.method)
     variables = () if estimator is None else estimator.fixed
     return frozenset(x for v in variables for x in (v, *(f"{v}_{end}" for end in SUFFIX.values())))
@@ -186,7 +193,7 @@ def _foot_side(of: str | None) -> Side | None:
 
 
 def _after_gaps(orientations: Oriented, side: Side, least_s: float) -> np.ndarray:
-    """Samples (n,) in a loss of a foot longer than `least_s` or within `AFTER_GAP_S` of its end."""
+    """Samples (n,) during a data loss of a foot longer than `least_s` or within `AFTER_GAP_S` of its end."""
     t_s, valid = orientations.t_s, orientations.valid[FOOT[side]]
     long = np.zeros(len(valid), np.bool_)
     for start, stop in find_runs(~valid):

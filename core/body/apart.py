@@ -1,8 +1,9 @@
-"""How far apart the feet stood.
+"""Correction of leg inclination from the measured distance between the feet in standing.
 
-Calibration takes every segment's long axis to be vertical while standing. Legs lean by some degrees when the
-feet stand wider or closer than the hips, and the width of every step is wrong by that difference. Nothing
-the sensors measure tells the lean; the distance of the ankles, measured with a tape, does.
+Calibration assumes that the long axis of every segment is vertical in standing. Legs are inclined by some
+degrees if the feet are further apart or closer together than the hips, and every step width is wrong by that
+difference. The sensors do not measure this inclination; it follows from the distance between the ankles,
+measured by tape.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ LONGEST: Final = 0.5
 def lean_legs_apart(
     calibrated: CalibratedRecording, orientations: Orientations, body: BodyModel
 ) -> tuple[CalibratedRecording, Orientations]:
-    """Thighs and shanks leaning as the standing width says; unchanged when nobody measured it.
+    """Thighs and shanks inclined according to the standing width; unchanged if it was not measured.
 
-    Both hips and both ankles are taken to be level and the legs straight. Joint angles do not change beyond
-    what their standing zero takes away.
+    Both hips and both ankles are assumed level and the legs straight. Joint angles change only by what their
+    standing zero removes.
     """
     if body.standing_width is None:
         return calibrated, orientations

@@ -1,4 +1,4 @@
-"""What two sensors beside a joint say of their arms to it, from the acceleration of one point.
+"""Evidence of the two sensors at a joint about their lever arms, from the acceleration of the joint centre.
 
 Equations: docs/science/calibration.md, "Places and centres from motion".
 """
@@ -35,10 +35,10 @@ MARGIN_S: Final = 2.0
 
 @dataclass(frozen=True, eq=False)
 class SensorView:
-    """What one sensor says of the points of its segment while walking.
+    """Acceleration terms of the points of a segment from one sensor while walking.
 
     M : (m, 3, 4) terms in W, columns along the segment's axes. wander : (m, 3, k) the acceleration of a point
-    that wanders along these axes by 1 m for each radian of a flexion. wander_sd : how far one does, m/rad.
+    that moves along these axes by 1 m per radian of flexion. wander_sd : prior of that movement, m/rad.
     usable : (m,).
     """
 
@@ -50,7 +50,7 @@ class SensorView:
 
 @dataclass(frozen=True, eq=False)
 class JointEvidence:
-    """Information L (6, 6) about both arms of a joint and h = L · mean (6,); its misfit."""
+    """Information matrix L (6, 6) of both lever arms of a joint, h = L · mean (6,), and the misfit."""
 
     L: Floats
     h: Floats
@@ -58,7 +58,7 @@ class JointEvidence:
 
 
 def name_kind(segment: Segment) -> str:
-    """Segment without its side."""
+    """Segment name without its side."""
     return segment.split("_")[0]
 
 
@@ -68,7 +68,7 @@ def view_sensors(
     segments: Sequence[Segment],
     params: ArmParams,
 ) -> tuple[dict[Segment, SensorView], float]:
-    """Every sensor over the first of the straight walking, and the rate; empty without any."""
+    """All sensors over the first part of straight walking, and the rate; empty without any."""
     rate = calibrated.recording.rate_hz
     walked = np.zeros(len(calibrated.recording.t_s), np.bool_)
     for window in calibrated.calibration.walking:
@@ -107,8 +107,9 @@ def view_sensors(
 
 
 def _measure_flexion(proximal: Floats, distal: Floats, walked: Bools) -> Floats:
-    """Turn (n,) about the medio-lateral axis of two segments (n, 4) against each other, from its mean in
-    walking, rad."""
+    """Flexion angle (n,) of two segments (n, 4) about the medio-lateral axis, relative to its mean in
+    walking, rad.
+    """
     relative = multiply(conjugate(proximal), distal)
     turn = np.unwrap(2.0 * np.arctan2(relative[:, 3], relative[:, 0]))
     return np.asarray(turn - turn[walked].mean())
@@ -117,8 +118,9 @@ def _measure_flexion(proximal: Floats, distal: Floats, walked: Bools) -> Floats:
 def _accelerate(
     q: Floats, flexions: Sequence[Floats], rate_hz: float, thin: int, params: ArmParams
 ) -> Floats:
-    """Acceleration (m, 3, 3 k) in W, in the band, of points that wander along segment axes (n, 4) with each
-    of k flexions (n,)."""
+    """Acceleration (m, 3, 3 k) in W, band-passed, of points that move along segment axes (n, 4) with each
+    of k flexions (n,).
+    """
     if not flexions:
         return np.zeros((len(q[::thin]), 3, 0))
     low, high = params.joints.band_hz
@@ -134,10 +136,11 @@ def _accelerate(
 def ask_joint(
     first: SensorView, second: SensorView, arms: Floats, spread: Floats, rate_hz: float, params: ArmParams
 ) -> JointEvidence | None:
-    """What the two sensors beside a joint say of their arms to it; None where they hardly walked together.
+    """Estimate both lever arms of a joint from its two sensors; None with too little common walking.
 
-    With turn and wandering as nuisances: Gauss-Newton from the nominal arms (6,), whose spread (6, 6) keeps
-    the start near, then the nuisances marginalised.
+    Relative heading and soft-tissue movement are nuisance parameters: Gauss-Newton from the nominal arms
+    (6,), whose covariance (6, 6) keeps the solution near them, after which the nuisance parameters are
+    marginalised.
     """
     seen = first.usable & second.usable
     n = int(np.count_nonzero(seen))

@@ -1,4 +1,4 @@
-"""How far sensors and joints may be from where they usually are, and how far what is measured is believed."""
+"""Prior uncertainty of sensor positions and joint centres, and reliability of their measurement."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from sagittal.core.agreement.params import JointBandParams
 
 @dataclass(frozen=True)
 class ArmParams:
-    """How far places and centres may be from the nominal ones, and how far what is measured is believed.
+    """Prior uncertainty of sensor positions and joint centres, and reliability of their measurement.
 
     Parameters
     ----------
-    place_sd : kind of segment → (3,) of the sensor's place along its axes, m. centre_sd : joint → (3,) of its
-        centre in the proximal segment, m. wander_sd : kind of segment → how far a joint wanders in the
-        sensor's axes for one radian of flexion, m/rad. turn_sd : of the turn between both sensors' headings,
-        rad. noise_mps2 : least spread of the difference.
-    stride_s : the whole walk counts as so much independent evidence. longest_s : so much walking is looked
-        at. least_s : with less a joint says nothing. worst_misfit : of a joint's acceleration over its size,
-        above which it says nothing. joints : which part of accelerations is compared.
+    place_sd : kind of segment → (3,) of the sensor position along its axes, m. centre_sd : joint → (3,) of
+        its centre in the proximal segment, m. wander_sd : kind of segment → apparent movement of the joint in
+        sensor axes per radian of flexion, m/rad. turn_sd : of the relative heading of the two sensors, rad.
+        noise_mps2 : minimum spread of the difference.
+    stride_s : duration of independent evidence assigned to the whole walk. longest_s : maximum duration of
+        walking used. least_s : minimum duration for a joint. worst_misfit : maximum misfit relative to the
+        joint acceleration. joints : frequency band of the comparison.
     """
 
     place_sd: Mapping[str, tuple[float, float, float]] = field(

@@ -1,9 +1,10 @@
-"""Where the sensors sit and where the joints lie, from motion and from what is usual, each with its spread.
+"""Estimation of sensor positions and joint centres from motion and priors, with their uncertainty.
 
-Two sensors beside a joint see the acceleration of one point: that shows the arms from both to it. Skin moves
-the sensors over the bone with every step alike, so a walk says no more than a stride does; and how far the
-joint wanders in a sensor's axes as the leg bends is estimated along with the arms. Nominal places and lengths
-are the prior (docs/science/calibration.md, "Places and centres from motion").
+The two sensors at a joint observe the acceleration of one point, which determines their lever arms to it.
+Soft tissue moves the sensors relative to the bone in the same way at every step, so a walk carries no more
+information than a stride; the apparent movement of the joint in sensor axes during flexion is estimated along
+with the arms. Nominal positions and lengths are the prior (docs/science/calibration.md, "Places and centres
+from motion").
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from sagittal.core.calibration.knee_axis import KneeAxes, measure_knees
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 
 LegJoint = tuple[Segment, Segment]
@@ -49,12 +51,12 @@ the largest is 4°; with all axes turned by 30° they show 17 to 31°."""
 
 @dataclass(frozen=True, eq=False)
 class SensorPlace:
-    """Where one sensor sits, in its segment's axes.
+    """Position of one sensor in the axes of its segment.
 
     Parameters
     ----------
-    guess, place, sd : (3,) m; nominal, as used, and its standard deviation. taken : (3,) components in which
-        motion was heard; the others are the guess.
+    guess, place, sd : (3,) m; nominal, as used, and its standard deviation. taken : (3,) components estimated
+        from motion; the others are nominal.
     """
 
     guess: Floats
@@ -65,12 +67,13 @@ class SensorPlace:
 
 @dataclass(frozen=True, eq=False)
 class JointCentre:
-    """Where one joint lies, in the axes of its proximal segment.
+    """Position of one joint centre in the axes of its proximal segment.
 
     Parameters
     ----------
-    guess, centre, sd : (3,) m; nominal, as used, and its standard deviation. misfit : what both sensors'
-        accelerations of it differ by, over its size; None where it was not asked. asked : it was heard.
+    guess, centre, sd : (3,) m; nominal, as used, and its standard deviation. misfit : difference of the
+        accelerations from both sensors, relative to their magnitude; None if not evaluated. asked : the
+        estimate was used.
     """
 
     guess: Floats
@@ -82,14 +85,14 @@ class JointCentre:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredArms:
-    """Places of the sensors and centres of the joints of one take.
+    """Sensor positions and joint centres of one recording.
 
     Parameters
     ----------
-    knees : hinges of the knees from rates alone; the filter does not use them.
-    ahead, ahead_sd : by how much all forward axes together seem turned to the right, rad: with axes turned
-        back by it, usual places fit best. What is beyond doubt is told and the places turn with it; else they
-        rest on the axes as they are.
+    knees : knee hinge axes from rates alone; not used by the filter.
+    ahead, ahead_sd : apparent common rotation of all forward axes to the right, rad: after undoing it,
+        nominal positions fit best. If significant it is reported and the positions are rotated by it;
+        otherwise they refer to the unchanged axes.
     """
 
     sensors: Mapping[Segment, SensorPlace]
@@ -100,12 +103,12 @@ class MeasuredArms:
 
     @property
     def places(self) -> dict[Segment, Floats]:
-        """Segment → (3,) sensor in segment axes, m."""
+        """Segment → (3,) sensor position in segment axes, m."""
         return {s: x.place for s, x in self.sensors.items()}
 
     @property
     def centres(self) -> dict[LegJoint, Floats]:
-        """Joint → (3,) its centre in the axes of the proximal segment, m."""
+        """Joint → (3,) centre in the axes of the proximal segment, m."""
         return {j: x.centre for j, x in self.joints.items()}
 
 
@@ -116,11 +119,11 @@ def measure_arms(
     segments: Sequence[Segment],
     params: ArmParams | None = None,
 ) -> MeasuredArms:
-    """Places and centres that fit the walk, its joints and what is usual.
+    """Estimate sensor positions and joint centres that fit the walk, its joints and the priors.
 
     Parameters
     ----------
-    calibrated, orientations : forward axes that agree with the joints already. segments : those in use.
+    calibrated, orientations : with forward axes already aligned by the joints. segments : those in use.
     """
     params = params or ArmParams()
     usual = _Usual.of(body, segments, params)
@@ -153,12 +156,12 @@ def measure_arms(
 
 @dataclass(frozen=True, eq=False)
 class _Usual:
-    """Where sensors sit and joints lie on most people: the unknowns of the fit, in its order.
+    """Nominal sensor positions and joint centres: the unknowns of the fit, in order.
 
     Parameters
     ----------
-    guesses : segment → (3,) its sensor. nominal : joint → (3,) its centre. mean, sd : of all components, m.
-    turns : (components,) how they move when the forward axes turn, m/rad.
+    guesses : segment → (3,) sensor position. nominal : joint → (3,) centre. mean, sd : of all components, m.
+        turns : (components,) their derivative by a rotation of the forward axes, m/rad.
     """
 
     guesses: Mapping[Segment, Floats]
@@ -169,7 +172,7 @@ class _Usual:
 
     @classmethod
     def of(cls, body: BodyModel, segments: Sequence[Segment], params: ArmParams) -> _Usual:
-        """By the body model."""
+        """Nominal values from the body model."""
         nominal = {j: above for j, (above, _) in joint_places(body).items() if set(j) <= set(segments)}
         guesses = {s: sensor_place(s, body) for s in segments}
         mean = np.concatenate((*guesses.values(), *nominal.values()))
@@ -189,8 +192,9 @@ class _Usual:
         return slice(first, first + ARM)
 
     def weigh(self, params: ArmParams) -> tuple[Floats, Floats]:
-        """Information about all components and the turn of all forward axes, which is the last, and about
-        their mean."""
+        """Information matrix and vector of the prior, for all components and the common rotation of the
+        forward axes, which is the last one.
+        """
         unturned = np.concatenate((np.eye(len(self.mean)), -self.turns[:, None]), axis=1)
         N = unturned.T @ (self.sd[:, None] ** -2.0 * unturned)
         b = unturned.T @ (self.sd**-2.0 * self.mean)
@@ -198,8 +202,9 @@ class _Usual:
         return N, b
 
     def stand_side_by_side(self, N: Floats, b: Floats, measured: bool) -> None:
-        """Add that wherever along them the joints lie, both legs end side by side, and as far apart as the
-        tape says where their distance was measured."""
+        """Add the constraint that both legs end side by side, and, if the standing width was measured, at
+        that distance.
+        """
         stands = [(0, BESIDE_SD_M), *([(ARM - 1, TAPE_SD_M)] if measured else [])]
         for axis, spread_m in stands:
             apart = np.zeros(len(b))
@@ -210,7 +215,7 @@ class _Usual:
             b += apart * (apart[:-1] @ self.mean) / spread_m**2
 
     def find_arms(self, joint: LegJoint) -> Floats:
-        """(6, components + 1) both arms of a joint of the components."""
+        """Matrix (6, components + 1) that maps the components to both lever arms of a joint."""
         to_arms = np.zeros((ARMS, len(self.mean) + 1))
         for k, segment in enumerate(joint):
             to_arms[ARM * k : ARM * (k + 1), self.part(segment)] = -np.eye(ARM)
@@ -230,7 +235,9 @@ def _hear_joints(
     orientations: Orientations,
     params: ArmParams,
 ) -> tuple[dict[LegJoint, float], set[LegJoint]]:
-    """Add to N and b what walking says of each joint; the joints' misfits, and those that were believed."""
+    """Add the evidence of walking on each joint to N and b; returns the misfits of the joints, and those
+    used.
+    """
     misfits: dict[LegJoint, float] = {}
     heard: set[LegJoint] = set()
     sides, rate_hz = view_sensors(calibrated, orientations, tuple(usual.guesses), params)
@@ -250,17 +257,20 @@ def _hear_joints(
 
 
 def report_ahead(arms: MeasuredArms) -> tuple[Notice, ...]:
-    """What the reader must know where sensors sit as if nobody had walked ahead: `forward_against_places`."""
+    """Notice `forward_against_places` if the sensor positions suggest a common rotation of all forward
+    axes.
+    """
     if not _is_turned(arms.ahead, arms.ahead_sd):
         return ()
-    message = (
-        f"The sensors sit as if every forward axis were turned by about {degrees(abs(arms.ahead)):.0f}° to "
-        f"the {'right' if arms.ahead > 0.0 else 'left'}. Frontal and transverse angles are doubtful. Check "
-        "where the sensors sit and that the person walked ahead."
+    message = Message(
+        "The sensors sit as if every forward axis were turned by about {degrees:.0f}° to the "
+        f"{'right' if arms.ahead > 0.0 else 'left'}. Frontal and transverse angles are "
+        "doubtful. Check where the sensors sit and that the person walked ahead.",
+        degrees=degrees(abs(arms.ahead)),
     )
     return (Notice("forward_against_places", message, severity="warning"),)
 
 
 def _is_turned(ahead: float, ahead_sd: float) -> bool:
-    """Whether all forward axes are turned beyond doubt."""
+    """Whether a common rotation of all forward axes is significant."""
     return abs(ahead) > max(AHEAD_TOLD, AHEAD_Z * ahead_sd)

@@ -1,4 +1,4 @@
-"""Which pose estimator the working sensors allow, and what is used when one of them failed."""
+"""Selection of the pose estimator by the working sensors, and the fallback after a failure."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from sagittal.core.estimators import (
 )
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 
 WHOLE: Final = PRESETS["lower_body7"]
@@ -36,12 +37,12 @@ LEAST_SLIPPED: Final = 0.25
 
 @dataclass(frozen=True)
 class Choice:
-    """What a take can be estimated with.
+    """Estimators available for a recording.
 
     Parameters
     ----------
-    segments : with a working sensor, in the order of docs/science/erkf.md. failed : without.
-    possible : estimators, best first. order : those to try, of them; the one asked for alone.
+    segments : with a working sensor, in the order of docs/science/erkf.md. failed : with a failed sensor.
+        possible : estimators, best first. order : those to try; only the requested one if any.
     reduced : see `Poses.reduced`.
     """
 
@@ -54,7 +55,7 @@ class Choice:
 
 
 def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
-    """Estimators that can run on these segments, the one taken by default first."""
+    """Estimators that can run on these segments, the default one first."""
     worn = set(segments)
     found = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(worn)]
     if ERKF.runs_on(worn):
@@ -68,16 +69,16 @@ def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ..
 def choose(
     calibrated: CalibratedRecording, orientations: Orientations, requested: Requested, least_valid: float
 ) -> Choice:
-    """Look which sensors work and what they allow.
+    """Determine the working sensors and the estimators they allow.
 
     Parameters
     ----------
-    least_valid : share of the take a sensor must be there for; below it has failed. One that slipped may be
-        there for less.
+    least_valid : minimum fraction of the recording with data for a working sensor; lower for a sensor that
+        slipped.
 
     Raises
     ------
-    EstimationError `estimator_impossible` when the requested one needs sensors that are not there.
+    EstimationError `estimator_impossible` if the requested one needs sensors that are unavailable.
     """
     worn = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
     share = {s: float(np.mean(x.valid)) for s, x in worn.items()}
@@ -105,17 +106,20 @@ def _without_standing(
     notices: tuple[Notice, ...],
     failed: tuple[Segment, ...],
 ) -> Choice:
-    """No estimator: each begins with how a person stands, and a mean posture is 10° off that.
+    """No estimator: each starts from standing, and a mean walking posture deviates from that by 10°.
 
     Raises
     ------
-    EstimationError `estimator_impossible` when one was asked for.
+    EstimationError `estimator_impossible` if one was requested.
     """
     if requested != AUTO:
         raise EstimationError(
             "estimator_impossible",
-            f"The estimator {requested} begins with standing, and nobody stands still in this take. Let it "
-            "be chosen, or record 3 s of standing.",
+            Message(
+                "The estimator {requested} begins with standing, and nobody stands still in this "
+                "take. Let it be chosen, or record 3 s of standing.",
+                requested=requested,
+            ),
         )
     return Choice(working, failed, (), (), NO_STANDING, notices)
 
@@ -125,10 +129,13 @@ def _report_failed(
 ) -> tuple[Notice, ...]:
     notices = []
     for s in failed:
-        message = (
-            f"The {s} sensor can be used for {share[s]:.0%} of the take, {need[s]:.0%} is needed, "
-            "so it is left out: angles of its joints are missing or estimated. Charge, fasten or replace it "
-            "and record again."
+        message = Message(
+            "The {value} sensor can be used for {share:.0%} of the take, {need:.0%} is needed, so "
+            "it is left out: angles of its joints are missing or estimated. Charge, fasten or "
+            "replace it and record again.",
+            value=s,
+            share=share[s],
+            need=need[s],
         )
         notices.append(Notice("sensor_failed", message, sensor=s))
     return tuple(notices)
@@ -136,7 +143,9 @@ def _report_failed(
 
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:
     need = BY_NAME[requested].needs
-    return (
-        f"The estimator {requested} needs sensors on {need}; working: {', '.join(working) or 'none'}. "
-        "Choose another estimator."
+    return Message(
+        "The estimator {requested} needs sensors on {need}; working: {join}. Choose another estimator.",
+        requested=requested,
+        need=need,
+        join=", ".join(working) or "none",
     )

@@ -1,4 +1,4 @@
-"""Which foot is on the floor, as data: masks made from the times of initial and terminal contact."""
+"""Floor contact of each foot as masks, from the times of initial and terminal contact."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from sagittal.core.frames import Bools, Floats
 
 
 def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> Bools:
-    """Samples (n,) at which a foot is on the floor: from each initial contact to the next terminal contact.
+    """Samples (n,) with a foot on the floor: from each initial contact to the next terminal contact.
 
-    Before its first event a foot stands if that event is a terminal contact, and after its last if that is an
-    initial contact. Between two terminal contacts without an initial one (a missed event) the swing is taken
-    to last until half way.
+    Before its first event a foot is on the floor if that event is a terminal contact, after its last if that
+    is an initial contact. Between two terminal contacts without an initial one (a missed event) the swing is
+    assumed to last until half way.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sensor signals as the pose filters take them: without the bias of rest, sensor axes."""
+"""Sensor signals as input of the pose filters: corrected for bias at rest, in sensor axes."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ def correct_signals(
 ) -> tuple[Floats, Floats, Bools]:
     """Specific force and angular rate (T, n, 3), valid (T, n) of the sensors of these segments, in order.
 
-    Of a part of the take where one is given.
+    For a part of the recording if one is given.
 
-    What |acc| at rest differs from G is taken off as a bias along the segment's axis that is vertical at
-    rest, not as a scale; the gyroscope's mean at rest is taken off (docs/science/calibration.md, "Standing").
+    The difference of |acc| at rest from G is subtracted as a bias along the segment axis that is vertical at
+    rest, not as a scale factor; the gyroscope mean at rest is subtracted (docs/science/calibration.md,
+    "Standing").
     """
     samples = len(calibrated.recording.t_s[part])
     valid = np.empty((samples, len(segments)), np.bool_)
@@ -36,7 +37,7 @@ SIGNALS: tuple[SignalName, SignalName] = ("acc", "gyr")
 
 @dataclass(frozen=True, eq=False)
 class CorrectedSignals:
-    """One signal as `correct_signals` gives it, of the part that is asked for."""
+    """One signal as returned by `correct_signals`, computed for the requested part only."""
 
     calibrated: CalibratedRecording
     segments: Sequence[Segment]

@@ -1,8 +1,8 @@
-"""Mounted sensors → Poses by the best estimator that they allow, and the paths of the feet.
+"""Calibrated sensors → Poses by the best estimator available, and the paths of the feet.
 
-Seven sensors: ErKF with smoother (Potter 2021). Pelvis and feet, or feet alone: L7S (Sy 2021) for the figure,
-and an unlinked ErKF for each foot, because stride lengths are never taken from L7S
-(docs/science/l7s.md, "Limits"). What is asked of a take with a failed sensor is in choice.py.
+Seven sensors: ErKF with smoother (Potter 2021). Pelvis and feet, or feet alone: L7S (Sy 2021) for the poses,
+and an unlinked ErKF for each foot, because stride lengths are never taken from L7S (docs/science/l7s.md,
+"Limits"). choice.py handles recordings with a failed sensor.
 """
 
 from __future__ import annotations
@@ -44,6 +44,7 @@ from sagittal.core.errors import EstimationError, Notice
 from sagittal.core.estimators import BY_NAME, ERKF, L7S_3I, NO_FIGURE, ORIENTATIONS_ONLY, Estimator
 from sagittal.core.frames import FOOT, GRAVITY, SIDES, Bools, Segment, Side
 from sagittal.core.fusion.orientations import LastReading, Orientations
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.held_samples import lay_aside
 from sagittal.core.signals.memory import give_memory_back
@@ -56,12 +57,12 @@ ON_A_BELT: Final = (
 
 @dataclass(frozen=True, eq=False)
 class PoseEstimate:
-    """What the stage poses gives.
+    """Result of the pose stage.
 
     Parameters
     ----------
-    orientations : of the segments with a working sensor, refined where the ErKF ran: what angles are of.
-    poses : the figure. feet : None when no foot sensor works.
+    orientations : of the segments with a working sensor, refined if the ErKF ran; used for joint angles.
+        poses : of the whole body model. feet : None without a working foot sensor.
     """
 
     orientations: Orientations
@@ -72,17 +73,17 @@ class PoseEstimate:
 def estimate_poses(
     mounted: MountedSensors, contacts: Mapping[Side, Bools], params: PoseParams
 ) -> PoseEstimate:
-    """Estimate the poses of a take.
+    """Estimate the poses of a recording.
 
     Parameters
     ----------
-    mounted : of the stage mounting, made with the same parameters. Where its orientations are a
-        `LastReading`, those that the ErKF refined are forgotten.
+    mounted : result of the mounting stage with the same parameters. If its orientations are a `LastReading`,
+        those refined by the ErKF are released.
     contacts : side → (n,) foot on the floor, from the events.
 
     Raises
     ------
-    EstimationError of an estimator that was asked for by name. Unasked, an estimator that fails gives way to
+    EstimationError of an explicitly requested estimator. In automatic mode, a failed estimator is replaced by
     the next possible one, with a notice `estimator_failed`.
     """
     choice = mounted.choice
@@ -102,7 +103,11 @@ def estimate_poses(
         except EstimationError as error:
             if estimator == choice.order[-1]:
                 raise
-            message = f"{estimator} cannot estimate this take, the next one is used. {error.message}"
+            message = Message(
+                "{estimator} cannot estimate this take, the next one is used. {message}",
+                estimator=estimator,
+                message=error.message,
+            )
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
             reduced = "estimator_failed"
     if made is None:
@@ -113,7 +118,10 @@ def estimate_poses(
         try:
             made = take.with_feet(made, used)
         except EstimationError as error:
-            message = f"The paths of the feet cannot be estimated, so there are no distances. {error.message}"
+            message = Message(
+                "The paths of the feet cannot be estimated, so there are no distances. {message}",
+                message=error.message,
+            )
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
     poses = replace(
         made.poses,
@@ -131,7 +139,7 @@ def estimate_poses(
 
 @dataclass(frozen=True, eq=False)
 class _Take:
-    """The arguments of `estimate_poses`, the failed sensors taken out of the orientations."""
+    """The arguments of `estimate_poses`, with failed sensors removed from the orientations."""
 
     mounted: MountedSensors
     orientations: Orientations
@@ -202,12 +210,12 @@ class _Take:
         return PoseEstimate(orientations, poses, foot_tracks(run, orientations, self.body, tracks))
 
     def anchored(self) -> PoseEstimate:
-        """Orientations as they are, a figure by forward kinematics."""
+        """Unchanged orientations with poses by forward kinematics."""
         poses = forward_kinematics(self.orientations, self.body, self.contacts, self.params.anchor)
         return PoseEstimate(self.orientations, poses, None)
 
     def steps(self) -> dict[Side, Bools]:
-        """When each foot is still."""
+        """Samples with each foot still."""
         found: dict[Side, Bools] = {}
         for side in SIDES:
             acc, gyr, valid = correct_signals(self.calibrated, (FOOT[side],))
@@ -216,11 +224,11 @@ class _Take:
         return found
 
     def with_feet(self, made: PoseEstimate, segments: tuple[Segment, ...]) -> PoseEstimate:
-        """The same with each foot by an ErKF of its own; as it was without a foot.
+        """The same with a separate ErKF for each foot; unchanged without feet.
 
         Raises
         ------
-        EstimationError of `run_erkf`.
+        EstimationError as `run_erkf`.
         """
         feet = tuple(FOOT[s] for s in SIDES if FOOT[s] in segments)
         if not feet:
@@ -255,13 +263,13 @@ def _without(orientations: Orientations, failed: Collection[Segment]) -> Orienta
 
 
 def compile_pose_kernels() -> None:
-    """Compile all kernels of poses or load them, so that the first take does not wait for it."""
+    """Compile all pose kernels or load them from the cache, so that the first recording is not delayed."""
     compile_erkf_kernels()
     compile_l7s_kernel()
 
 
 def compile_erkf_kernels() -> None:
-    """The same of the ErKF and its smoother."""
+    """The same for the ErKF and its smoother."""
     tree = person_tree(BodyModel.from_height(NOMINAL_HEIGHT_M), {"foot_r": np.eye(3)}, ("foot_r",))
     acc, gyr = np.tile([0.0, GRAVITY, 0.0], (2, 1, 1)), np.zeros((2, 1, 3))
     inputs = erkf_inputs(tree, acc, gyr, np.ones((2, 1), bool), 100.0)

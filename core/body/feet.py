@@ -1,4 +1,4 @@
-"""Where the feet go: what strides, steps, width and clearance are measured on."""
+"""Paths of the feet, from which stride and step length, step width and clearance are measured."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ class FootTracks:
     ----------
     p : side → (n, 3) ankle centre in W, m. q : side → (n, 4) foot axes to W, scalar first.
     still : side → (n,) the foot rests on the floor (zero velocity; shorter than contact).
-    valid : side → (n,) the sensor was there.
-    linked : both feet hang on one chain of sensors, so that their places relative to each other are known;
-        False: each foot has its own origin and heading.
-    source : `sagittal.core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; live their live twins.
-    patched : side → (n,) packets were lost while the foot moved, and a straight line says too little of it.
-    posture : what the feet's neutral posture and direction are of; toe-out is told from standing alone.
-    sensor_ahead : side → how far ahead of its nominal place the sensor was found to sit, m, 0 where not
-        given; a shoe's sole is measured from the sensor.
-    withheld : side → reason why no distance of this foot is told (core/angles/withheld.py).
+    valid : side → (n,) sensor data available.
+    linked : both feet belong to one chain of sensors, so that their relative positions are known; False: each
+        foot has its own origin and heading.
+    source : `sagittal.core.estimators.LINKED_PATHS` or `SINGLE_PATHS`; or the corresponding live values.
+    patched : side → (n,) packets were lost while the foot moved, and linear interpolation is insufficient.
+    posture : posture that defines the neutral orientation and direction of the feet; toe-out is reported only
+        for standing.
+    sensor_ahead : side → estimated distance of the sensor in front of its nominal position, m, 0 if not
+        given; the sole of a shoe is measured from the sensor.
+    withheld : side → reason why distances of this foot are suppressed (core/angles/withheld.py).
     """
 
     t_s: Floats

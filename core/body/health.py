@@ -1,4 +1,4 @@
-"""What an estimator says about its own result: measured quantities against limits with a source."""
+"""Health findings of an estimator on its own result: diagnostics compared with limits that have a source."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ Verdict = Literal["good", "warn", "bad"]
 
 @dataclass(frozen=True)
 class HealthFinding:
-    """One measured quantity of a run.
+    """One diagnostic of a run.
 
     Parameters
     ----------
     name : with its unit at the end, e.g. "joint_residual_mm", "zero_velocity_refused_pct".
-    of : the joint, segment or side it belongs to, None for the whole take.
-    warn, bad : limits; a value beyond is judged so. None = shown, not judged.
+    of : the joint, segment or side it belongs to, None for the whole recording. warn, bad : upper limits of
+        the next better verdict. None = displayed, not judged.
     """
 
     name: str
@@ -38,7 +38,7 @@ class HealthFinding:
 
 
 def find_worst_verdict(findings: Sequence[HealthFinding]) -> Verdict:
-    """The least favourable verdict of all."""
+    """The worst verdict of all."""
     verdicts = {f.verdict for f in findings}
     return "bad" if "bad" in verdicts else "warn" if "warn" in verdicts else "good"
 

@@ -1,10 +1,10 @@
-"""Forward kinematics: orientations and lengths → poses of a figure that walks, anchored by the standing foot.
+"""Forward kinematics: orientations and lengths → poses of a walking body, anchored by the supporting foot.
 
-The chain gives every point relative to the pelvis. What is on the floor does not move: the pelvis travels
-with minus the velocity of the sole point in contact, integrated, so that there is never a jump; its height
-puts the lowest sole point in contact on z = 0 at every moment, so that height does not drift. The sole rolls:
-between heel and ball the contact point is the lower one, blended smoothly. Horizontal drift is that of the
-relative chain only and is not corrected: positions are for looking at, stride lengths need an estimator
+The chain gives every point relative to the pelvis. The contact point on the floor does not move: the pelvis
+position integrates the negative velocity of the sole point in contact, so that there is never a jump; its
+height puts the lowest sole point in contact at z = 0 at every moment, so that height does not drift. The sole
+rolls: of heel and ball the lower one is the contact point, with smooth blending. Horizontal drift is that of
+the relative chain and is not corrected: positions are for visualisation, stride lengths require an estimator
 (docs/science/body-model.md, "Figure without a filter").
 """
 
@@ -22,6 +22,7 @@ from sagittal.core.body.poses import Poses
 from sagittal.core.errors import Notice
 from sagittal.core.estimators import NO_FIGURE, ORIENTATIONS_ONLY
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import rotate
 from sagittal.core.subject.anthropometry import BodyMeasures
 from sagittal.core.subject.shoe import Shoe
@@ -37,12 +38,12 @@ walker at a foot of .265 m."""
 
 @dataclass(frozen=True)
 class AnchorParams:
-    """Smoothing of the change from one contact point to the next (our choice, for the eye).
+    """Smoothing of the transition between contact points (our choice, for visualisation).
 
     Parameters
     ----------
-    blend_s : time over which the weight passes from foot to foot. soft_m : height difference over which the
-    weight passes between heel and ball, and between feet when no contacts are known.
+    blend_s : time over which the weight shifts from foot to foot. soft_m : height difference over which the
+        weight shifts between heel and ball, and between feet without known contacts.
     """
 
     blend_s: float = 0.10
@@ -55,9 +56,9 @@ def nominal_body(
     shoe: Shoe | None = None,
     measures: BodyMeasures | None = None,
 ) -> tuple[BodyModel, tuple[Notice, ...]]:
-    """Body model from height in m and what was measured, with a notice `height_assumed` without a height.
+    """Body model from height in m and measured lengths, with a notice `height_assumed` without a height.
 
-    Without a height that of a measured leg is taken, else 1.70 m.
+    Without a height it is derived from a measured leg length, else 1.70 m is assumed.
     """
     leg_m = None if measures is None else measures.leg_m
     assumed_m = NOMINAL_HEIGHT_M if leg_m is None else leg_m / LEG_FRACTION
@@ -68,9 +69,10 @@ def nominal_body(
         body = replace(body, sole_back=back, sole_front=front, sole_tip_up=shoe.tip_up_m)
     if height_m is not None:
         return body, ()
-    message = (
-        f"Body height is not given; the figure is drawn with {assumed_m:.2f} m. Enter the height "
-        "to see true proportions and distances; joint angles do not depend on it."
+    message = Message(
+        "Body height is not given; the figure is drawn with {assumed_m:.2f} m. Enter the "
+        "height to see true proportions and distances; joint angles do not depend on it.",
+        assumed_m=assumed_m,
     )
     return body, (Notice("height_assumed", message, severity="info"),)
 
@@ -86,12 +88,12 @@ def forward_kinematics(
     Parameters
     ----------
     contacts : side → (n,) True while that foot is on the floor (contacts.contact_mask); without it the lower
-        foot carries.
+        foot is the supporting one.
 
     Returns
     -------
-    Poses. Its figure holds the pelvis and the legs with thigh, shank and foot; `figure_incomplete` says what
-    is left out and why. Without the pelvis or without any complete leg `p` and `q` are empty.
+    Poses of the pelvis and of the legs with thigh, shank and foot; `figure_incomplete` lists omitted parts
+    with reasons. Without the pelvis or without any complete leg `p` and `q` are empty.
     """
     params = params or AnchorParams()
     n = len(orientations.t_s)
@@ -146,7 +148,7 @@ def leg_points(q: Mapping[Segment, Floats], body: BodyModel, side: Side) -> tupl
 
 
 def sole_points(body: BodyModel) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Heel and ball contact points in foot coordinates, origin at the ankle centre."""
+    """Heel and ball contact points in foot axes, origin at the ankle centre."""
     return (HEEL * body.foot, -body.ankle_height, 0.0), (BALL * body.foot, -body.ankle_height, 0.0)
 
 
@@ -180,13 +182,13 @@ def _travel(soles: Floats, carrying: Mapping[Side, Bools], rate_hz: float, param
 
 
 def _somebody_carries(carrying: Mapping[Side, Bools]) -> dict[Side, Bools]:
-    """Walking has no flight: where both feet are said to swing, both may carry and the lower one will."""
+    """Make either foot a candidate for support where both would be in swing: walking has no flight phase."""
     nobody = ~np.logical_or.reduce(list(carrying.values()))
     return {s: c | nobody for s, c in carrying.items()}
 
 
 def incomplete_legs(orientations: Orientations, legs: list[Side]) -> tuple[Notice, ...]:
-    """Notices `figure_incomplete` for what a figure of these legs leaves out of the worn sensors."""
+    """Notices `figure_incomplete` for sensors that do not contribute to these legs."""
     notices = []
     if "pelvis" not in orientations.q:
         message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one there."
@@ -194,6 +196,10 @@ def incomplete_legs(orientations: Orientations, legs: list[Side]) -> tuple[Notic
     for side in SIDES:
         missing = [x for x in (THIGH[side], SHANK[side], FOOT[side]) if x not in orientations.q]
         if side not in legs and len(missing) < 3:
-            message = f"The {side} leg is left out of the figure, no sensor on {' and '.join(missing)}."
+            message = Message(
+                "The {side} leg is left out of the figure, no sensor on {missing}.",
+                side=side,
+                missing=" and ".join(missing),
+            )
             notices.append(Notice("figure_incomplete", message, sensor=missing[0]))
     return tuple(notices)

@@ -1,4 +1,4 @@
-"""What every live estimator takes and gives: a block of samples in, a block of the body out."""
+"""Interface of the live estimators: a block of samples in, a block of body poses out."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ class MeasuredBlock(NamedTuple):
 
     Parameters
     ----------
-    turned : segment → (T, 4) to W by its sensor alone (`AttitudeTracker`), of
-        `LivePoseEstimator.attitudes` and the feet. filled : (T, n) lost, a straight line instead.
+    turned : segment → (T, 4) to W from its sensor alone (`AttitudeTracker`), for
+        `LivePoseEstimator.attitudes` and the feet. filled : (T, n) lost samples, linearly interpolated.
     """
 
     acc: Floats
@@ -27,7 +27,7 @@ class MeasuredBlock(NamedTuple):
 
 
 class FootBlock(NamedTuple):
-    """A block of the feet: p (T, F, 3), q (T, F, 4), still, valid, patched (T, F), as `FootTracks`."""
+    """A block of foot data: p (T, F, 3), q (T, F, 4), still, valid, patched (T, F), as `FootTracks`."""
 
     p: Floats
     q: Floats
@@ -37,13 +37,13 @@ class FootBlock(NamedTuple):
 
 
 class BodyBlock(NamedTuple):
-    """A block of the body.
+    """A block of body poses.
 
     Parameters
     ----------
-    q, p : (T, S, 4), (T, S, 3) of the estimator's segments, p NaN where it gives no place. known : (T, S) the
-        orientation means something. whole : (T,) the figure does.
-    paths : of the feet that carry a sensor.
+    q, p : (T, S, 4), (T, S, 3) of the estimator's segments, p NaN if it gives no position. known : (T, S) the
+        orientation is valid. whole : (T,) the complete pose is valid.
+    paths : of the feet with a sensor.
     """
 
     q: Floats
@@ -54,10 +54,10 @@ class BodyBlock(NamedTuple):
 
 
 class LivePoseEstimator(Protocol):
-    """What turns signals into a body.
+    """Estimator of body poses from signals.
 
-    segments : of `BodyBlock`. attitudes : segments whose orientation by their sensor alone it wants.
-    linked, source : as in `FootTracks`. broken : it gave up.
+    segments : of `BodyBlock`. attitudes : segments whose single-sensor orientation is required as input.
+    linked, source : as in `FootTracks`. broken : it has failed.
     """
 
     method: LiveMethod
@@ -68,13 +68,13 @@ class LivePoseEstimator(Protocol):
 
     @property
     def broken(self) -> bool:
-        """Whether a filter gave up."""
+        """Whether a filter has failed."""
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
-        """The next samples; the first block is the whole standing window."""
+        """Process the next samples; the first block is the whole standing window."""
 
     def drain_notices(self) -> list[Notice]:
-        """What is new to be said of itself."""
+        """New notices."""
 
 
 def list_worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:

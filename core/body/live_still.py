@@ -1,10 +1,10 @@
-"""When a foot stands still and when a sensor rests, told at the sample itself: the window trails.
+"""Causal detection of still feet and resting sensors, with a trailing window.
 
-Offline the window is centred (core/body/still.py) and stops before the foot moves; here the last samples of a
-rest are those in which the heel already begins to rise. What it costs was measured on gaitmap_foot,
-neura_walk and seven virtual people: a longer or stricter window loses short rests (stride lengths of
-gaitmap_foot ± 70 mm instead of ± 30), and strides become up to 8 mm shorter, because a foot that begins to
-roll is taken to stand. The remedy is to believe it less: see `ROLLING_MPS`.
+Offline the window is centred (core/body/still.py) and ends before the foot moves; here the last samples of a
+rest already include the beginning of heel rise. The cost was measured on gaitmap_foot, neura_walk and seven
+simulated people: a longer or stricter window misses short rests (stride lengths of gaitmap_foot ± 70 mm
+instead of ± 30), and strides become up to 8 mm shorter, because a foot that begins to roll still counts as
+stationary. The remedy is to increase its uncertainty: see `ROLLING_MPS`.
 """
 
 from __future__ import annotations
@@ -32,18 +32,20 @@ LIMITS.setflags(write=False)
 
 
 def count_needed_samples(rate_hz: float) -> tuple[int, int]:
-    """Quiet samples in a row, this one included, after which a foot stands and a sensor rests."""
+    """Consecutive quiet samples, including the current one, required for a still foot and for a resting
+    sensor.
+    """
     return max(1, round(FOOT_S * rate_hz)), max(1, round(AT_REST.window_s * rate_hz))
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def count_trailing_samples(acc, gyr, valid, limits, need, quiet, still):  # type: ignore[no-untyped-def]
-    """Count quiet samples in a row and say which are still.
+    """Count consecutive quiet samples and mark still ones.
 
     Parameters
     ----------
     acc, gyr : (T, n, 3). valid : (T, n). limits : (2, 2). need : (2,). quiet : (n, 2) counts so far, advanced
-        in place. still : (T, n, 2) written: stands as a foot, rests.
+        in place. still : (T, n, 2) written: still foot, resting sensor.
     """
     for k in range(acc.shape[0]):
         for i in range(acc.shape[1]):
@@ -59,14 +61,14 @@ def count_trailing_samples(acc, gyr, valid, limits, need, quiet, still):  # type
 
 
 class StillnessDetector:
-    """The rule on n sensors, block by block; any division into blocks gives the same bits."""
+    """The rule on n sensors, block by block; results are bit-identical for any division into blocks."""
 
     def __init__(self, n: int, rate_hz: float) -> None:
         self._need = np.array(count_needed_samples(rate_hz), np.int64)
         self._quiet = np.zeros((n, 2), np.int64)
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> Bools:
-        """(T, n, 2): stands as a foot does, rests; acc, gyr (T, n, 3) corrected, valid (T, n)."""
+        """Mask (T, n, 2): still foot, resting sensor; acc, gyr (T, n, 3) corrected, valid (T, n)."""
         still = np.empty((*valid.shape, 2), np.bool_)
         count_trailing_samples(acc, gyr, valid, LIMITS, self._need, self._quiet, still)
         return still

@@ -32,12 +32,12 @@ class BodyModel:
     ----------
     hip_width : between hip centres. thigh : hip to knee centre. shank : knee to ankle centre.
     ankle_height : ankle centre above the sole. foot : heel to toe.
-    estimated : True when a length is taken from body height by Winter's fractions, False when none is.
+    estimated : True if any length is derived from body height by Winter's fractions.
     standing_width : between the ankle centres while standing for calibration, None = not measured.
-    sole_back, sole_front : rear end and tip of the shoe's sole behind and in front of the ankle centre, by
-        the nominal place of the sensor; sole_tip_up : how far the tip stands off the floor when the foot is
-        flat. None = not measured.
-    measured : names of the lengths that a tape gave; of `hip_width` by the measured pelvis.
+    sole_back, sole_front : horizontal distances from the ankle centre back to the rear end and forward to the
+        tip of the shoe's sole, based on the nominal sensor position; sole_tip_up : height of the tip above
+        the floor with the foot flat. None = not measured.
+    measured : names of the tape-measured lengths; `hip_width` if derived from the measured pelvis.
     """
 
     hip_width: float
@@ -58,9 +58,9 @@ class BodyModel:
 
     @classmethod
     def from_height(cls, height_m: float, measures: BodyMeasures | None = None) -> BodyModel:
-        """Lengths as measured, the others by fractions of body height in m (Winter 2009, fig 4.1).
+        """Measured lengths, the others as fractions of body height in m (Winter 2009, fig 4.1).
 
-        Of a measured leg thigh, shank and ankle have the same shares as of a leg of the height's length.
+        For a measured leg, thigh, shank and ankle have the same proportions as in a leg derived from height.
         """
         tape = measures or BodyMeasures()
         leg_height = height_m if tape.leg_m is None else tape.leg_m / LEG_FRACTION

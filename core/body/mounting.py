@@ -1,9 +1,9 @@
-"""How the sensors sit, once more, as the whole body shows it: standing width, and joints that must meet.
+"""Refinement of the sensor alignment from the whole body: standing width, and consistency of the joints.
 
-Calibration finds each sensor's mounting on its own. Three things only the body as a whole tells: how far legs
-lean that stand wider or closer than the hips (apart.py), which forward axes do not fit the joints
-(headings.py), and where on its segment a sensor sits (arms.py). Live and from a file it is the same
-function.
+Calibration estimates the alignment of each sensor independently. Three quantities require the body as a
+whole: the inclination of legs with the feet wider or closer than the hips (apart.py), forward axes
+inconsistent with the joints (headings.py), and sensor positions on the segments (arms.py). Live and offline
+use the same function.
 """
 
 from __future__ import annotations
@@ -27,17 +27,16 @@ from sagittal.core.signals.calibrated import CalibratedRecording
 
 @dataclass(frozen=True, eq=False)
 class MountedSensors:
-    """A take whose mountings are final: whatever follows takes these, never those of the calibration.
+    """A recording with final sensor alignment, which later stages use instead of that of the calibration.
 
     Parameters
     ----------
-    calibrated : the recording with these mountings. orientations : with them, each sensor on its own.
-    body : lengths and standing width. assumed : notices of lengths that nobody gave.
+    calibrated : the recording with this alignment. orientations : with it, each sensor independently. body :
+        lengths and standing width. assumed : notices on assumed lengths.
     choice : the sensors that work and what they allow.
-    turned_rad : segment → how far its forward axis was turned; empty where the ErKF is not the estimator.
-    arms : where its sensors sit and its joints lie, as motion shows it; None where the ErKF is not the
-        estimator.
-    failure : the joints could not be asked, so the ErKF cannot run either.
+    turned_rad : segment → correction of its forward axis; empty if the ErKF is not the estimator.
+    arms : sensor positions and joint centres estimated from motion; None if the ErKF is not the estimator.
+    failure : the error of the joint evaluation, with which the ErKF cannot run either.
     """
 
     calibrated: CalibratedRecording
@@ -53,7 +52,8 @@ class MountedSensors:
 def mount_sensors(
     calibrated: CalibratedRecording, orientations: Orientations, params: PoseParams
 ) -> MountedSensors:
-    """Lean the legs by the standing width, turn forward axes until the joints agree, and measure the arms.
+    """Incline the legs by the standing width, rotate forward axes to agree with the joints, and estimate the
+    lever arms.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def mount_sensors(
 
     Raises
     ------
-    EstimationError `estimator_impossible` when the estimator asked for cannot run on these sensors; those of
-    `headings` when the ErKF was asked for by name.
+    EstimationError `estimator_impossible` if the requested estimator cannot run on these sensors; those of
+    `headings` if the ErKF was requested explicitly.
     """
     subject = calibrated.recording.subject
     # how far apart the feet stood leans legs that stand

@@ -1,7 +1,7 @@
-"""Where sensors are taken to sit when nobody has measured it: nominal positions in segment axes.
+"""Nominal sensor positions in segment axes, used where they are not measured.
 
 Segment frames are those of core/frames.py (x anterior, y up, z to the right), origins of core/body/poses.py.
-Source: docs/science/body-model.md, "Places of sensors". 2 cm beside the place change joint angles by ≤ 0.3°
+Source: docs/science/body-model.md, "Places of sensors". Displacements of 2 cm change joint angles by ≤ 0.3°
 and strides by ≤ 0.5 cm; 7 cm along the shank or 3 cm up or down the foot change strides by 1 to 4 cm.
 """
 
@@ -52,7 +52,7 @@ def joint_places(body: BodyModel) -> dict[tuple[Segment, Segment], tuple[Floats,
 
 
 def standing_origin(segment: Segment, body: BodyModel) -> Floats:
-    """Origin (3,) in m of a segment in W in neutral standing, mid-hip over the origin, floor at z = 0."""
+    """Origin (3,) in m of a segment in W in neutral standing, mid-hip above the origin, floor at z = 0."""
     knee = body.ankle_height + body.shank
     hip = knee + body.thigh
     height = {"thigh": hip, "shank": knee, "foot": body.ankle_height}.get(segment[:-2], hip)

@@ -1,4 +1,4 @@
-"""Parameters of the stages mounting and poses."""
+"""Parameters of the mounting and pose stages."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sagittal.core.body.kinematics import AnchorParams
 from sagittal.core.body.l7s.filter import L7sParams
 from sagittal.core.errors import ParameterError
 from sagittal.core.estimators import AUTO, Requested
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
@@ -19,9 +20,9 @@ class PoseParams:
 
     Parameters
     ----------
-    estimator : "auto" picks by what is worn.
-    least_valid : share of the take a sensor must be there for (our choice).
-    arms : of the places of sensors and joints. anchor : of the figure without a filter.
+    estimator : "auto" selects by the available sensors.
+    least_valid : minimum fraction of the recording with data from a sensor (our choice).
+    arms : of sensor positions and joint centres. anchor : of the poses without a filter.
 
     Raises
     ------
@@ -40,5 +41,9 @@ class PoseParams:
         if self.estimator not in known:
             raise ParameterError(
                 "unknown_estimator",
-                f"'{self.estimator}' is no estimator; expected one of {', '.join(known)}.",
+                Message(
+                    "'{estimator}' is no estimator; expected one of {known}.",
+                    estimator=self.estimator,
+                    known=", ".join(known),
+                ),
             )

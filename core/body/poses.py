@@ -1,4 +1,4 @@
-"""What the body model gives: where each segment is and how it is turned."""
+"""Result of the body model: position and orientation of each segment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from sagittal.core.signals.held_samples import SHORT
 
 
 def figure_precision(samples: int) -> type[np.floating[Any]]:
-    """Of a figure of so many samples: a longer one is held as its file has it, at half of 850 MB for 6 h."""
+    """Floating-point type of the poses: long recordings use that of the file, half of 850 MB for 6 h."""
     return np.float64 if samples <= SHORT else np.float32
 
 
@@ -29,13 +29,13 @@ class Poses:
     q : segment → (n, 4) segment to world, scalar first.
     p : segment → (n, 3) position of the segment's origin, m, world W (floor at z = 0). Origins: pelvis
         mid-hip, thigh hip centre, shank knee centre, foot ankle centre
-    (docs/reference/coordinate-systems.md). valid : (n,) all segments of the figure measured.
-    contact : segment (feet) → (n,) True while the foot is taken to be on the floor.
-    q, p : in single precision where the take is long (`figure_precision`).
-    method : of an estimator of `sagittal.core.estimators`, or its NO_FIGURE.
-    reduced : a stable code when a better estimator was not possible or not asked for: "sensor_failed",
-        "not_calibrated", "no_standing", "estimator_failed"; None for the best one of the worn sensors.
-    health : the estimator's own findings.
+    (docs/reference/coordinate-systems.md). valid : (n,) all segments measured.
+    contact : segment (feet) → (n,) True while the foot is considered on the floor.
+    q, p : in single precision for long recordings (`figure_precision`).
+    method : of an estimator in `sagittal.core.estimators`, or its NO_FIGURE.
+    reduced : a stable code if a better estimator was impossible or not requested: "sensor_failed",
+        "not_calibrated", "no_standing", "estimator_failed"; None for the best one with the available sensors.
+        health : findings of the estimator on its result.
     """
 
     t_s: Floats

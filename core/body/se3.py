@@ -1,9 +1,8 @@
 """Exponential and right Jacobian of SE(3) inside compiled loops, for the filter of L7S.
 
-ξ = (ρ, φ); T Exp(ξ) = (R Exp(φ), p + R J_l(φ) ρ). ad(ξ) = [[φ×, ρ×], [0, φ×]];
-Φ(ξ) = Σ (−1)^i/(i+1)! ad(ξ)^i (Sy 2021 eq 8) is the right Jacobian. What turns alone needs:
-core/rotation/compiled.py.
-Source: docs/science/l7s.md, "Frames and symbols"; Barfoot 2017, State Estimation for Robotics, §7.
+ξ = (ρ, φ); T Exp(ξ) = (R Exp(φ), p + R J_l(φ) ρ). ad(ξ) = [[φ×, ρ×], [0, φ×]]; Φ(ξ) = Σ (−1)^i/(i+1)! ad(ξ)^i
+(Sy 2021 eq 8) is the right Jacobian. Pure rotations: core/rotation/compiled.py. Source: docs/science/l7s.md,
+"Frames and symbols"; Barfoot 2017, State Estimation for Robotics, §7.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ def _quotients(square):  # type: ignore[no-untyped-def]
 
 @inner_njit(error_model="numpy", **UNCOUNTED)
 def _slopes(square, a, b):  # type: ignore[no-untyped-def]
-    """Derivatives of a and b by θ, over θ."""
+    """Derivatives of a and b with respect to θ, divided by θ."""
     if square < SMALL:
         return _sum_powers(_SLOPE_A, square), _sum_powers(_SLOPE_B, square)
     return (1.0 - square * b - 2.0 * a) / square, (a - 3.0 * b) / square
@@ -79,7 +78,7 @@ def right_jacobian(xi, at, same, cross):  # type: ignore[no-untyped-def]
     """Write Φ(ξ) = [[same, cross], [0, same]], blocks (3, 3); ξ is xi[at : at + 6].
 
     `same` is J_r(φ) = 1 − a [φ]× + b [φ]×², `cross` its derivative along ρ: the series of Φ differentiated
-    term by term, as ad(ξ)^i has the derivative of [φ]×^i beside its diagonal.
+    term by term, as the off-diagonal block of ad(ξ)^i is the derivative of [φ]×^i.
     """
     x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]
     r, s, t = xi[at], xi[at + 1], xi[at + 2]

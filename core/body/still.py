@@ -1,11 +1,11 @@
-"""Where a foot stands still, for zero-velocity updates, and where any sensor rests, for tilt.
+"""Detection of still feet for zero-velocity updates, and of resting sensors for tilt.
 
-Both are rules on the magnitude of angular rate and of specific force, so they need no orientation. A foot's
-rule is the wide one: .7 rad/s and 1.2 m/s² find 14 of 14 stances of the real walk with none too many
-(docs/science/real-recordings.md, "Contacts at rest"); what it lets through wrongly is the χ² gate's matter.
-Events (core/events) say where contact begins and ends; the foot is flat and still only in a part of that
-time. A brisk walker's foot never is: it rolls from the heel to the ball without a halt. Where the rule finds
-nothing between two swings, the quietest moment between them is taken, believed as far as it is quiet.
+Both are rules on the magnitude of angular rate and specific force, so they need no orientation. The rule for
+feet is the wider one: .7 rad/s and 1.2 m/s² detect 14 of 14 stances of the real walk without false ones
+(docs/science/real-recordings.md, "Contacts at rest"); false detections are handled by the χ² gate. Events
+(core/events) mark the beginning and end of contact; the foot is flat and still only during part of that time.
+A brisk walker's foot never is: it rolls from heel to ball without a pause. If the rule detects nothing
+between two swings, the quietest moment between them is used, weighted by how quiet it is.
 """
 
 from __future__ import annotations
@@ -38,19 +38,20 @@ AT_REST = StillRule(0.08, 0.25, 0.3, 0.3)
 
 @dataclass(frozen=True)
 class QuietestRule:
-    """Where a foot on the floor never stops: the quietest moment of its stance.
+    """Fallback for feet that never come to rest: the quietest moment of the stance.
 
-    Loudness is the greater of |ω| and ||f| − g|, each by its limit in `still`, the greatest over its window:
-    below 1 the foot is still. All values are our choice (docs/science/erkf.md, "Zero velocity").
+    Activity is the greater of |ω| and ||f| − g|, each relative to its limit in `still`, as the maximum over
+    its window: below 1 the foot is still. All values are our choice (docs/science/erkf.md, "Zero velocity").
 
     Parameters
     ----------
-    apart_s : a moment is the quietest within so long before and after it: less than the stride of a brisk
-        walker, more than from the middle of a slow swing to the still part of a stance.
-    loudest : of a stance. ipol_walks' stances reach 2.1, the quietest moments of their swings begin at 4.
-    swing_rad_s, swing_s : within so long before and after it the foot must swing.
-    share : |ω| in it, of the greatest within swing_s. Feet of ipol_walks have 0.02 to 0.05, few up to 0.1; a
-        shank, taken for a foot, 0.10 to 0.15 (neura_walk, simulated people), a thigh 0.2 and more.
+    apart_s : the moment must be the quietest within this time before and after: less than the stride of a
+        brisk walker, more than from the middle of a slow swing to the still part of a stance.
+    loudest : highest activity in a stance. Stances of ipol_walks reach 2.1, the quietest moments of swings
+        start at 4.
+    swing_rad_s, swing_s : the foot must swing within this time before and after.
+    share : maximum ratio of |ω| to its peak within swing_s. Feet in ipol_walks have 0.02 to 0.05, few up to
+        0.1; a shank labelled as a foot 0.10 to 0.15 (neura_walk, simulated people), a thigh at least 0.2.
     """
 
     still: StillRule = FOOT_STILL
@@ -67,7 +68,7 @@ QUIETEST = QuietestRule()
 def contact_samples(
     acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: QuietestRule = QUIETEST
 ) -> tuple[Bools, Floats]:
-    """Samples (T,) at which a foot rests on the floor, and |ω| (T,) where it is not still there, else 0.
+    """Samples (T,) with a foot resting on the floor, and |ω| (T,) where it is not still there, else 0.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def contact_samples(
 
 
 def still_samples(acc: Floats, gyr: Floats, valid: Bools, rate_hz: float, rule: StillRule) -> Bools:
-    """Samples (T,) at which one sensor is still; acc, gyr (T, 3), never where it is not valid."""
+    """Samples (T,) at which one sensor is still; acc, gyr (T, 3); invalid samples never are."""
     quiet = (
         valid & (find_lengths(gyr) < rule.gyr_limit) & (np.abs(find_lengths(acc) - GRAVITY) < rule.acc_limit)
     )

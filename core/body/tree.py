@@ -1,9 +1,9 @@
-"""The kinematic tree the pose filters run on: IMUs, and the joints that hold them together.
+"""The kinematic tree of the pose filters: IMUs, and the joints that link them.
 
-Nothing in a filter knows about legs: it sees sensors, joint centres in sensor axes, hinge axes and which
-sensors come to rest on the floor. Trees of people are made from a body model, how the sensors sit
-(calibration) and where (places.py). Where no joint links two sensors, as with two feet alone, they are
-filtered side by side.
+Filters know nothing about legs: they use sensors, joint centres in sensor axes, hinge axes and the set of
+sensors that come to rest on the floor. Trees of people are built from a body model, the sensor-to-segment
+alignment (calibration) and sensor positions (places.py). Sensors without a common joint, such as two feet
+alone, are filtered independently.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sagittal.core.body.model import LENGTHS, BodyModel
 from sagittal.core.body.places import joint_places, sensor_place, standing_origin
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, from_matrix, rotate, to_matrix
 
 Preset = Literal["lower_body7", "feet_pelvis3", "feet2", "single_foot_r", "single_foot_l"]
@@ -47,7 +48,7 @@ class Joint:
 
     Parameters
     ----------
-    proximal, distal : indices of the sensors. r_proximal, r_distal : (3,) the centre in their axes, m.
+    proximal, distal : indices of the sensors. r_proximal, r_distal : (3,) joint centre in their axes, m.
     e_proximal, e_distal : (3,) unit hinge axis in their axes, or None.
     """
 
@@ -62,7 +63,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class ImuTree:
-    """What the filters know about the set-up.
+    """The sensor set-up as used by the filters.
 
     Parameters
     ----------
@@ -90,7 +91,9 @@ class ImuTree:
         if len(set(self.imus)) != n:
             twice = next(s for s in self.imus if self.imus.count(s) > 1)
             raise EstimationError(
-                "duplicate_segment", f"{twice} carries two sensors; set one of them aside.", sensor=twice
+                "duplicate_segment",
+                Message("{twice} carries two sensors; set one of them aside.", twice=twice),
+                sensor=twice,
             )
         for name, a, width in (
             ("q_mount", self.q_mount, 4),
@@ -99,29 +102,45 @@ class ImuTree:
         ):
             if a.shape != (n, width):
                 raise ParameterError(
-                    "bad_shape", f"ImuTree: {name} has shape {a.shape}, expected {(n, width)}."
+                    "bad_shape",
+                    Message(
+                        "ImuTree: {name} has shape {shape}, expected {value}.",
+                        name=name,
+                        shape=a.shape,
+                        value=(n, width),
+                    ),
                 )
         group = list(range(n))
         for joint in self.joints:
             if (joint.e_proximal is None) != (joint.e_distal is None):
                 raise ParameterError(
-                    "bad_joint", f"ImuTree: {joint.name} has one hinge axis of two; give both or none."
+                    "bad_joint",
+                    Message("ImuTree: {name} has one hinge axis of two; give both or none.", name=joint.name),
                 )
             if not (
                 0 <= joint.proximal < n and 0 <= joint.distal < n and all(0 <= foot < n for foot in self.feet)
             ):
-                raise EstimationError("joint_unknown", f"{joint.name} or a foot names a sensor out of 0…{n}.")
+                raise EstimationError(
+                    "joint_unknown",
+                    Message("{name} or a foot names a sensor out of 0…{value}.", name=joint.name, value=n),
+                )
             for r in (joint.r_proximal, joint.r_distal):
                 if not (np.isfinite(r).all() and np.linalg.norm(r) < LONGEST_M):
                     raise EstimationError(
                         "segment_length",
-                        f"{joint.name} lies at {np.round(r, 3).tolist()} m from its sensor, expected within "
-                        f"{LONGEST_M:g} m; check the body model's units.",
+                        Message(
+                            "{name} lies at {round} m from its sensor, expected within {LONGEST_M:g} m; "
+                            "check the body model's units.",
+                            name=joint.name,
+                            round=np.round(r, 3).tolist(),
+                            LONGEST_M=LONGEST_M,
+                        ),
                     )
             part, other = group[joint.proximal], group[joint.distal]
             if part == other:
                 raise EstimationError(
-                    "joint_loop", f"{joint.name} closes a loop; a tree has one way to each IMU."
+                    "joint_loop",
+                    Message("{name} closes a loop; a tree has one way to each IMU.", name=joint.name),
                 )
             group = [part if g == other else g for g in group]
 
@@ -131,7 +150,7 @@ class ImuTree:
         return [i for i in range(len(self.imus)) if i not in below]
 
     def forward(self) -> Floats:
-        """The segments' anterior axes (n, 3) in sensor axes."""
+        """Anterior axes (n, 3) of the segments in sensor axes."""
         return rotate(conjugate(self.q_mount), np.array([1.0, 0.0, 0.0]))
 
     def segments(self, p: Floats, q: Floats) -> tuple[Floats, Floats]:
@@ -179,8 +198,13 @@ def _check_mounts(mounts: Mapping[Segment, Floats], segments: Sequence[Segment])
     if missing:
         raise EstimationError(
             "segments_missing",
-            f"{len(segments) - len(missing)} of {len(segments)} sensors are there, missing: "
-            f"{', '.join(missing)}; choose an estimator for the sensors worn.",
+            Message(
+                "{len} of {segments} sensors are there, missing: {missing}; choose an estimator for "
+                "the sensors worn.",
+                len=len(segments) - len(missing),
+                segments=len(segments),
+                missing=", ".join(missing),
+            ),
             sensor=missing[0],
         )
 
@@ -192,20 +216,19 @@ def person_tree(
     places: Mapping[Segment, Floats] | None = None,
     centres: Mapping[tuple[Segment, Segment], Floats] | None = None,
 ) -> ImuTree:
-    """The tree of the worn sensors; neighbours on the body are joined, knees are hinges.
+    """The tree of the available sensors; neighbours on the body are linked, knees are hinges.
 
     Parameters
     ----------
     mounts : segment → (3, 3) R_segment_sensor (`SegmentCalibration.R_segment_sensor`).
     segments : in this order, a `PRESETS` entry or any other set.
-    places : segment → (3,) sensor in segment axes, m; nominal where not given.
-    centres : (proximal, distal) → (3,) the joint's centre in the axes of the proximal segment, m; by the body
-        model where not given.
+    places : segment → (3,) sensor position in segment axes, m; nominal if not given. centres : (proximal,
+        distal) → (3,) joint centre in the axes of the proximal segment, m; from the body model if not given.
 
     Raises
     ------
-    EstimationError `segments_missing` when one of `segments` has no mount, `segment_length` when a length of
-    the body model is not positive; and those of `ImuTree`.
+    EstimationError `segments_missing` if one of `segments` has no mount, `segment_length` if a length of the
+    body model is not positive; and those of `ImuTree`.
     """
     _check_mounts(mounts, segments)
     _check_lengths(body)
@@ -242,9 +265,9 @@ def person_tree(
 
 
 def walker3(leg_m: float = 0.92, hip_width_m: float = 0.39, pelvis_sensor_m: float = 0.08) -> ImuTree:
-    """The three bodies of Potter et al. 2021: a pelvis and two straight legs on hip hinges, sensors unturned.
+    """The three bodies of Potter et al. 2021: a pelvis and two straight legs on hip hinges, sensors aligned.
 
-    Sensors sit above the middle of the hips and at the ends of the legs (fig 1, data set 1).
+    Sensors are above the midpoint of the hips and at the ends of the legs (fig 1, data set 1).
     """
     lateral, up, axis = 0.5 * hip_width_m, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
     joints = tuple(
@@ -267,6 +290,11 @@ def _check_lengths(body: BodyModel) -> None:
         if not (np.isfinite(length) and 0.0 < length < LONGEST_M):
             raise EstimationError(
                 "segment_length",
-                f"The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; enter the "
-                "body height or measure the segment.",
+                Message(
+                    "The body model's {name} is {length:g} m, expected between 0 and {LONGEST_M:g}; "
+                    "enter the body height or measure the segment.",
+                    name=name,
+                    length=length,
+                    LONGEST_M=LONGEST_M,
+                ),
             )

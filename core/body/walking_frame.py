@@ -1,4 +1,4 @@
-"""Accelerations in the frame of walking: forward, left, up, whatever way the person walks."""
+"""Accelerations in the walking frame: forward, left, up, independent of the walking direction."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ way. Our choice: about two strides."""
 
 
 def in_walking_frame(acceleration: Floats, q: Floats, rate_hz: float) -> Floats:
-    """Turn accelerations (n, 3) from W about the vertical, so that x is the segment's mean heading.
+    """Rotate accelerations (n, 3) in W about the vertical, so that x is the segment's mean heading.
 
     Parameters
     ----------

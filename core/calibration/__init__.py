@@ -1,4 +1,4 @@
-"""UniformRecording → CalibratedRecording: sensor-to-segment orientation, gyro bias, heading."""
+"""UniformRecording → CalibratedRecording: sensor-to-segment alignment, gyro bias, heading."""
 
 from sagittal.core.calibration.calibrate import CalibrationParams, calibrate
 

@@ -1,4 +1,4 @@
-"""Where is forward in a sensor: the anterior axis of one segment, from whatever the take offers for it."""
+"""Anterior axis of one sensor, from whatever evidence the recording provides."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ from sagittal.core.calibration.ways import (
 )
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import rotate
 from sagittal.core.signals.recording import SensorSignals
 
@@ -64,13 +65,13 @@ Method = Literal["walking_direction", "gyro_pca"]
 
 @dataclass(frozen=True, eq=False)
 class AnteriorAxis:
-    """The anterior axis of one sensor: first by rule, then as all sensors together have it.
+    """Anterior axis of one sensor: first by rule, then refined jointly over all sensors.
 
     Parameters
     ----------
-    angle : in the sensor's rest world, rad. notices : what to tell. measures : all that speaks of it.
-    mirror : the axis it turns about, as the other side's would be mirrored; None where that is not clear.
-    kept : the rule's angle stands, whatever the others say. sd : of the angle, rad.
+    angle : in the sensor's rest frame, rad. notices : to report. measures : all evidence for it.
+    mirror : its flexion axis, for comparison with the mirrored one of the other side; None if unclear.
+    kept : the angle found by rule is final, regardless of the other sensors. sd : of the angle, rad.
     """
 
     angle: float
@@ -95,11 +96,11 @@ def find_anterior_axis(
     params: HeadingParams,
     forward: ForwardParams,
 ) -> AnteriorAxis:
-    """Find the anterior axis of one segment by itself, and all that speaks of it.
+    """Estimate the anterior axis of one segment on its own, and collect all evidence for it.
 
     Parameters
     ----------
-    q : (n, 4) sensor to its rest world. declared : mounting text, "" if nobody said.
+    q : (n, 4) sensor to its rest frame. declared : placement text, "" if not declared.
 
     Raises
     ------
@@ -111,8 +112,12 @@ def find_anterior_axis(
         if written is None:
             raise CalibrationError(
                 "no_walking",
-                f"{segment}: no straight walking of 1.5 s or more was found and no mounting is declared. "
-                "Record at least 8 steps straight ahead, or declare the mounting: “lateral, face right”.",
+                Message(
+                    "{segment}: no straight walking of 1.5 s or more was found and no mounting is "
+                    "declared. Record at least 8 steps straight ahead, or declare the mounting: "
+                    "“lateral, face right”.",
+                    segment=segment,
+                ),
                 sensor=segment,
             )
         said = ForwardMeasure("declared", written, forward.declared_sd, forward.declared_doubt)
@@ -124,10 +129,15 @@ def find_anterior_axis(
     if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
-            f"{segment}: the walk and the declared mounting “{declared}” differ by "
-            f"{abs(degrees(subtract_angles(found.angle, written))):.0f}°, "
-            f"allowed are {degrees(CONFLICT):.0f}°. "
-            "Correct the mounting in the manifest, or the segment this sensor is mapped to.",
+            Message(
+                "{segment}: the walk and the declared mounting “{declared}” differ by {abs:.0f}°, allowed "
+                "are {CONFLICT:.0f}°. Correct the mounting in the manifest, or the segment this "
+                "sensor is mapped to.",
+                segment=segment,
+                declared=declared,
+                abs=abs(degrees(subtract_angles(found.angle, written))),
+                CONFLICT=degrees(CONFLICT),
+            ),
             sensor=segment,
         )
     return found
@@ -144,7 +154,9 @@ def _by_walking(
     params: HeadingParams,
     forward: ForwardParams,
 ) -> AnteriorAxis:
-    """Direction of the rest-to-rest velocity, or the axis of the acceleration with a sign from elsewhere."""
+    """Direction of the rest-to-rest velocity, or the axis of the acceleration with its sign from other
+    evidence.
+    """
     pca = measure_flexion(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical)
     a = horizontal_acceleration(q, signals.acc)
     steps_s = walk.steps_s if segment in TRUNK else None
@@ -197,7 +209,7 @@ def _sign_axis(
     written: float | None,
     params: HeadingParams,
 ) -> tuple[float, tuple[Notice, ...], dict[str, object]]:
-    """The end of the acceleration's axis that is forward where no velocity tells it, and by what."""
+    """Forward end of the acceleration axis if no velocity determines it, with the evidence used."""
     agrees = _vaulting(segment, signals, q, a, axis, walk)
     if written is None and abs(agrees) >= params.pendulum:
         angle = nearest_sign(axis, axis + (0.0 if agrees > 0.0 else np.pi))
@@ -209,11 +221,12 @@ def _sign_axis(
 def list_axis_measures(
     segment: Segment, angle: float, axis: WalkingDirection, pca: FlexionAxis, params: ForwardParams
 ) -> tuple[tuple[ForwardMeasure, ...], ForwardMeasure | None]:
-    """What the axes of acceleration and of turning say of the forward axis, and what the other side may use.
+    """Forward-axis measures from the axes of acceleration and rotation, and the one for use by the other
+    side.
 
     Parameters
     ----------
-    angle : of the forward axis, to within the half circle that gives both axes their sign, rad.
+    angle : approximate forward axis that determines the signs of both axes, rad.
     """
     doubt = max(params.axis_doubt, 1.0 - axis.score)
     heard = [ForwardMeasure("acceleration", nearest_sign(axis.angle, angle), params.axis_sd, doubt)]
@@ -231,7 +244,9 @@ def list_axis_measures(
 def weigh_axes(
     found: Mapping[Segment, AnteriorAxis], joints: Sequence[JointMeasure], params: ForwardParams
 ) -> dict[Segment, AnteriorAxis]:
-    """The forward axes as all sensors together have them, with their uncertainty, told where it is large."""
+    """Estimate the forward axes of all sensors jointly, with their uncertainty and a notice if it is
+    large.
+    """
     mirrors = {s: f.mirror for s, f in found.items() if f.mirror is not None}
     weighed = weigh_forward_axes({s: f.measures for s, f in found.items()}, joints, mirrors)
     better = {}
@@ -252,9 +267,14 @@ def weigh_axes(
 def _tell_uncertain(segment: Segment, sd: float, limit: float) -> Notice:
     return Notice(
         "forward_uncertain",
-        f"{segment}: its way forward is known to ± {degrees(sd):.0f}° only; ± {degrees(limit):.0f}° is good. "
-        "Frontal and transverse angles there are doubtful. Start straight ahead from standing and walk "
-        "further.",
+        Message(
+            "{segment}: its way forward is known to ± {sd:.0f}° only; ± {limit:.0f}° is good. Frontal "
+            "and transverse angles there are doubtful. Start straight ahead from standing and "
+            "walk further.",
+            segment=segment,
+            sd=degrees(sd),
+            limit=degrees(limit),
+        ),
         sensor=segment,
     )
 
@@ -262,7 +282,7 @@ def _tell_uncertain(segment: Segment, sd: float, limit: float) -> Notice:
 def _vaulting(
     segment: Segment, signals: SensorSignals, q: Floats, a: Complexes, angle: float, walk: CalibrationWalk
 ) -> float:
-    """`pendulum_agreement` of a pelvis with a direction; 0 for the others."""
+    """`pendulum_agreement` of a pelvis with a direction; 0 for other segments."""
     if segment != "pelvis" or walk.steps_s is None:
         return 0.0
     up = rotate(q, signals.acc)[:, 2]
@@ -279,15 +299,20 @@ def _by_gyro(
     written: float | None,
     forward: ForwardParams,
 ) -> AnteriorAxis:
-    """Flexion axis by gyro PCA, sign by declared mounting or the gait rules."""
+    """Flexion axis by gyro PCA, sign from the declared placement or the gait rules."""
     axis = flexion_axis(signals.gyr[walk.mask] - standing.gyro_bias, R_vertical, segment)
     angle, notices = _signed(segment, -axis.gamma, written, R_vertical, q, walk)
     if axis.rho < GOOD_AXIS:
         notices += (
             Notice(
                 "not_single_axis",
-                f"{segment}: the first component holds {axis.rho:.0%} of the movement, {GOOD_AXIS:.0%} or "
-                "more is good; the flexion axis may be off by 10° and more.",
+                Message(
+                    "{segment}: the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} or "
+                    "more is good; the flexion axis may be off by 10° and more.",
+                    segment=segment,
+                    rho=axis.rho,
+                    GOOD_AXIS=GOOD_AXIS,
+                ),
                 sensor=segment,
             ),
         )
@@ -298,25 +323,35 @@ def _by_gyro(
 def _signed(
     segment: Segment, axis: float, written: float | None, R_vertical: Floats, q: Floats, walk: CalibrationWalk
 ) -> tuple[float, tuple[Notice, ...]]:
-    """Choose the sign of an axis: by declared mounting first, then by the gait rules
-    (docs/science/calibration.md, "Signs")."""
+    """Choose the sign of an axis: from the declared placement first, then by the gait rules
+    (docs/science/calibration.md, "Signs").
+    """
     if written is not None:
         angle = nearest_sign(axis, written)
         return angle, _sign_notices(segment, angle, R_vertical, q, walk)
     if segment in TRUNK:
         raise CalibrationError(
             "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known, no standing is next to the walk. Stand still for "
-            "3 s directly before walking, or declare the mounting, for example “sacrum, face backwards”.",
+            Message(
+                "{segment}: which way it faces is not known, no standing is next to the walk. Stand "
+                "still for 3 s directly before walking, or declare the mounting, for example "
+                "“sacrum, face backwards”.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     margin = _margin(segment, axis, R_vertical, q, walk)
     if abs(margin) < WEAK_MARGIN:
         weak = Notice(
             "calibration_sign_weak",
-            f"{segment}: forward and backward swing differ by {degrees(abs(margin)):.1f}° only, at least "
-            f"{degrees(WEAK_MARGIN):.0f}° decide which way is forward. Check the sign of the curves, or "
-            "declare the mounting.",
+            Message(
+                "{segment}: forward and backward swing differ by {degrees:.1f}° only, at least "
+                "{WEAK_MARGIN:.0f}° decide which way is forward. Check the sign of the curves, or declare "
+                "the mounting.",
+                segment=segment,
+                degrees=degrees(abs(margin)),
+                WEAK_MARGIN=degrees(WEAK_MARGIN),
+            ),
             sensor=segment,
         )
         return (axis if margin >= 0 else nearest_sign(axis, axis + np.pi)), (weak,)
@@ -330,7 +365,9 @@ def _margin(segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk:
 def _sign_notices(
     segment: Segment, angle: float, R_vertical: Floats, q: Floats, walk: CalibrationWalk
 ) -> tuple[Notice, ...]:
-    """Tell when the gait rule contradicts a sign found otherwise; velocity and declaration go first."""
+    """Notice if the gait rule contradicts a sign from other evidence; velocity and declaration take
+    precedence.
+    """
     if segment in TRUNK:
         return ()
     margin = _margin(segment, angle, R_vertical, q, walk)
@@ -339,8 +376,12 @@ def _sign_notices(
     return (
         Notice(
             "calibration_sign_conflict",
-            f"{segment}: it swings {degrees(-margin):.0f}° further to the side where gait swings less. Check "
-            "that it is mapped to the right segment and that the walk was forwards.",
+            Message(
+                "{segment}: it swings {degrees:.0f}° further to the side where gait swings less. "
+                "Check that it is mapped to the right segment and that the walk was forwards.",
+                segment=segment,
+                degrees=degrees(-margin),
+            ),
             sensor=segment,
         ),
     )

@@ -52,6 +52,7 @@ from sagittal.core.calibration.ways import CalibrationWalk
 from sagittal.core.errors import CalibrationError, Notice, SignalError
 from sagittal.core.frames import R_NEUTRAL, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_vertical, from_matrix, rotate
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
@@ -69,8 +70,8 @@ SEEN_WAYS = ("strides", "velocity", *FUNCTIONAL)
 """Sources of a forward axis that a movement which leads nowhere does not have."""
 
 NO_WAY = (
-    "No walking found: the legs move slowly, and no sensor shows that they lead anywhere. Record at least 8 "
-    "steps straight ahead between two standings."
+    "No walking detected: the legs move slowly, and no sensor shows progression. Record at least 8 steps "
+    "straight ahead between two periods of standing."
 )
 
 NO_STANDING = (
@@ -85,11 +86,11 @@ class CalibrationParams:
 
     Parameters
     ----------
-    method : how the anterior axis of leg segments is found; the trunk is always by walking direction or
-        declared mounting, because walking gives it no sagittal axis
+    method : how the anterior axis of leg segments is estimated; the trunk always uses the walking direction
+    or the declared placement, because the trunk has no sagittal rotation axis in walking
         (docs/science/calibration.md, "Flexion axis by gyro PCA").
-    from_walking : where nobody stands still. functional : swings and bows done for the calibration.
-    forward, joint_turns : how forward axes are weighed. score : limits of the checks.
+    from_walking : calibration without quiet standing. functional : leg swings and trunk bows for calibration.
+    forward, joint_turns : joint estimation of forward axes. score : limits of the checks.
     """
 
     method: Method = "walking_direction"
@@ -105,26 +106,25 @@ class CalibrationParams:
 
 
 def calibrate(recording: UniformRecording, params: CalibrationParams | None = None) -> CalibratedRecording:
-    """Find how each sensor sits on its segment, from standing and walking, without a magnetometer.
+    """Estimate the sensor-to-segment alignment from quiet standing and walking, without a magnetometer.
 
-    Where nobody stands still with both feet side by side the walk alone has to do
-    (core/calibration/from_walking.py): a pause in mid-stride is no zero of angles.
+    Without quiet standing with the feet side by side the walk alone is used
+    (core/calibration/from_walking.py): a pause in mid-stride cannot define the zero of angles.
 
     Parameters
     ----------
-    recording : any subset of segments; rest before or after the walk, or none.
+    recording : any subset of segments, with or without a rest before or after the walk.
 
     Returns
     -------
-    CalibratedRecording. A sensor whose direction cannot be found is left out with a notice, as
-    `pelvis_heading_unknown`, so that its angles are withheld and the others still work.
+    CalibratedRecording. A sensor whose direction cannot be determined is omitted with a notice such as
+    `pelvis_heading_unknown`; its angles are suppressed, the others remain available.
 
     Raises
     ------
-    SignalError `unit_suspect`; `no_rest`, `rest_too_short`, `not_still`, `no_standing` where there is no walk
-    long enough either.
-    CalibrationError `no_segment`; where no sensor can be calibrated that of the first: `no_walking`,
-    `not_single_axis`, `calibration_sign_conflict`, `pelvis_heading_unknown`.
+    SignalError `unit_suspect`; `no_rest`, `rest_too_short`, `not_still`, `no_standing` if there is no
+    sufficiently long walk either. CalibrationError `no_segment`; if no sensor can be calibrated, the error of
+    the first: `no_walking`, `not_single_axis`, `calibration_sign_conflict`, `pelvis_heading_unknown`.
 
     References
     ----------
@@ -153,7 +153,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
 def _from_walking(
     recording: UniformRecording, rests: tuple[Window, ...], params: CalibrationParams, why: SignalError
 ) -> CalibratedRecording:
-    """Calibrate without a standing; `rests` are pauses, `why` says what was wrong with them."""
+    """Calibrate without standing; `rests` are pauses in walking, `why` is the reason for rejecting them."""
     return calibrate_from_walking(
         recording,
         params.walking,
@@ -176,7 +176,7 @@ def _calibrate_at(
     params: CalibrationParams,
     movements: FunctionalMovements,
 ) -> tuple[CalibratedRecording, float]:
-    """Calibrate on one of the rests, and by how much one leg was ahead of the other there, rad."""
+    """Calibrate on one of the rests; also returns how far one leg was ahead of the other in it, rad."""
     rate = recording.rate_hz
     standing = stand_all(recording, zero, rests, params.rest)
     q = {s: _rest_world(recording, s, standing[s], zero, params.attitude) for s in recording.sensors}
@@ -211,9 +211,11 @@ def _calibrate_at(
         notices += f.notices
     steps = _straight_steps(found, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
-        message = (
-            f"Calibration saw about {steps} straight {plural(steps, 'step', 'steps')}, {FEW_STEPS} or more "
-            "are good; walk further straight."
+        message = Message(
+            f"Calibration saw about {{steps}} straight {plural(steps, 'step', 'steps')}, {{FEW_STEPS}} "
+            "or more are good; walk further straight.",
+            steps=steps,
+            FEW_STEPS=FEW_STEPS,
         )
         notices.append(Notice("few_steps", message))
     if facing:
@@ -240,7 +242,9 @@ def _rest_world(
     zero: Window,
     params: AttitudeParams,
 ) -> Floats:
-    """Orientations (n, 4) of a sensor in its rest world: z up, x along its vertical frame's x at rest."""
+    """Orientations (n, 4) of a sensor in its rest frame: z up, x along the x axis of its vertical frame at
+    rest.
+    """
     signals = recording.sensors[segment]
     at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
@@ -258,7 +262,9 @@ def _walk(
     q: Mapping[Segment, Floats],
     params: HeadingParams,
 ) -> tuple[CalibrationWalk, float]:
-    """The straight parts to take the direction from, and their turn from where the person stood facing."""
+    """The straight parts used for the walking direction, and their turn relative to the standing
+    direction.
+    """
     rate = recording.rate_hz
     rest = next(r for r in rests if r[0] <= zero[0] and zero[1] <= r[1])
     first, last = round(rest[0] * rate), round(rest[1] * rate)
@@ -291,15 +297,17 @@ def _walk(
 
 
 def _tell_facing(turn: float, leads: bool) -> Notice:
-    """They stood facing elsewhere than they walked, rad; `leads`: the standing is before the walk."""
+    """Notice that standing and walking directions differ, rad; `leads`: standing precedes the walk."""
     between, todo = (
         ("standing and walking", "Start straight ahead from standing where possible.")
         if leads
         else ("walking and standing", "Stand still where the walk ends before turning where possible.")
     )
-    message = (
-        f"The person turned by {abs(degrees(turn)):.0f}° between {between}; forward is where they stood "
-        f"facing. {todo}"
+    message = Message(
+        "The person turned by {abs:.0f}° between {between}; forward is where they stood facing. {todo}",
+        abs=abs(degrees(turn)),
+        between=between,
+        todo=todo,
     )
     return Notice("facing_not_walking", message, severity="info")
 
@@ -340,7 +348,7 @@ def _straight_steps(
     q: Mapping[Segment, Floats],
     walk: CalibrationWalk,
 ) -> int | None:
-    """Steps that the direction rests on: twice the swings of one leg sensor."""
+    """Number of steps used for the direction: twice the swings of one leg sensor."""
     leg = next((s for s in found if s not in TRUNK), None)
     if leg is None or not walk.parts:
         return None

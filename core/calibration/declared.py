@@ -1,7 +1,7 @@
-"""Declared mountings that the walk contradicts, and the words that would put them right.
+"""Consistency of declared sensor placements with the walk, and proposed corrections.
 
-A declaration decides signs and, without a walk, the whole axis; a wrong one leaves its sensor out or turns
-its angles. Where the walk shows the forward axis without it, and clearly, both can be compared
+A declaration determines signs and, without a walk, the whole axis; a wrong one excludes its sensor or rotates
+its angles. If the walk clearly determines the forward axis independently, the two can be compared
 (docs/science/setup.md, "Declared mountings").
 """
 
@@ -43,10 +43,11 @@ WEAK: Final = frozenset(("calibration_sign_weak", "calibration_sign_conflict"))
 def propose_mountings(
     recording: UniformRecording, params: CalibrationParams | None = None
 ) -> SetupRepair | None:
-    """Words for declared mountings that the walk contradicts by a quarter turn or more; None without any.
+    """Corrected texts for declared placements that differ from the walk by a quarter turn or more; None
+    without any.
 
-    Says nothing where a take cannot be calibrated without the declarations, nor of a sensor whose forward
-    axis the walk does not show clearly.
+    No proposal is made if a recording cannot be calibrated without the declarations, nor for a sensor whose
+    forward axis the walk does not determine clearly.
     """
     declared = {
         s: text
@@ -74,7 +75,7 @@ def propose_mountings(
 
 
 def _list_known(declared: Mapping[str, str], free: CalibratedRecording) -> dict[Segment, str]:
-    """Those whose forward axis the walk shows clearly, sign included."""
+    """Segments whose forward axis is clearly determined by the walk, including its sign."""
     calibration = free.calibration
     weak = {n.sensor for n in calibration.notices if n.code in WEAK}
     return {
@@ -85,8 +86,9 @@ def _list_known(declared: Mapping[str, str], free: CalibratedRecording) -> dict[
 
 
 def _compare(segment: Segment, text: str, free: CalibratedRecording) -> tuple[float, Way | None]:
-    """How far the declared axis points from the declared way, rad, and the way it points; None where the
-    declaration may be right or no way is near."""
+    """Deviation of the declared axis from the declared direction, rad, and the direction it actually has;
+    None if the declaration may be right or no named direction is near.
+    """
     said = read_declared_direction(text)
     assert said is not None  # noqa: S101 (narrows the type; `propose_mountings` looked)
     axis, declared = said

@@ -1,7 +1,8 @@
-"""Fixed offset: sensors put on as agreed, so that how they sit is known without any movement.
+"""Fixed offset: sensors attached as specified by the protocol, so that their alignment is known without
+movement.
 
 Kianifar et al.: x of the device along the bone towards the trunk, y away from the body. On the front of the
-thigh and on the back y lies in the sagittal plane, on the flat side of the shin 45° inward of it.
+thigh and on the back y is in the sagittal plane, on the flat side of the shin 45° inward of it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ BACK.setflags(write=False)
 
 
 def make_fixed_mounts(*sides: Side) -> dict[Segment, Floats]:
-    """Segment → (3, 3) R_segment_sensor of the pelvis and of shank and thigh of the legs that squat."""
+    """Segment → (3, 3) R_segment_sensor for the pelvis and for shank and thigh of the squatting legs."""
     mounts: dict[Segment, Floats] = {}
     for side in sides:
         inward = SHIN_FACE if side == "right" else -SHIN_FACE

@@ -1,10 +1,10 @@
-"""Which way is forward in every sensor, from all that speaks of it at once, and how certain that is.
+"""Joint estimation of the forward axes of all sensors from all evidence, with their uncertainty.
 
-Each measure of a forward axis is right to within its own spread, or wrong altogether: a von Mises density
-mixed with a uniform one. Some measures are of one sensor, some of two: the sensors beside a joint see its one
-acceleration, so they know how they are turned against each other, and left mirrors right. The posterior is
-worked out on the circle, exactly, along the chain feet, shanks, thighs, pelvis
-(docs/science/calibration.md, "Forward by likelihood").
+Each measure of a forward axis is either right to within its own spread or completely wrong: a von Mises
+density mixed with a uniform one. Some measures concern one sensor, some two: the two sensors at a joint
+observe the same joint acceleration, which gives their relative heading, and left mirrors right. The posterior
+is computed exactly on the circle, along the chain feet, shanks, thighs, pelvis (docs/science/calibration.md,
+"Forward by likelihood").
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ LEVELS: Final[tuple[Mapping[Side, Segment], ...]] = (FOOT, SHANK, THIGH)
 
 @dataclass(frozen=True)
 class ForwardParams:
-    """How sure each measure is (docs/science/calibration.md, "Forward by likelihood").
+    """Reliability of each measure (docs/science/calibration.md, "Forward by likelihood").
 
     Parameters
     ----------
-    *_sd : spread where it is right, rad. *_doubt : probability that it is wrong altogether. velocity_error :
-    across the way after the drift is taken off, m/s: a slow walk's direction is less sure. axis_doubt : at
-    least, of the acceleration's axis; else what its share leaves to the other axis. mirror_sd : left against
-    right. tell_sd : a forward axis that is less sure is told.
+    *_sd : spread if right, rad. *_doubt : probability of being completely wrong. velocity_error_mps : lateral
+    velocity error after drift removal, m/s, which makes the direction of slow walks less certain.
+    axis_doubt : minimum for the acceleration axis; otherwise 1 − its share. mirror_sd : left against right.
+    tell_sd : a larger uncertainty of a forward axis is reported.
     """
 
     strides_sd: float = radians(2.0)
@@ -81,12 +81,12 @@ class ForwardParams:
 
 @dataclass(frozen=True)
 class ForwardMeasure:
-    """What one measure says of one forward axis.
+    """One measure of one forward axis.
 
     Parameters
     ----------
-    angle : of the axis in the sensor's rest world, rad. sd : its spread where it is right, rad. doubt :
-    probability that it is wrong altogether, before the others are heard.
+    angle : of the axis in the sensor's rest frame, rad. sd : its spread if right, rad. doubt : prior
+    probability of being completely wrong.
     """
 
     source: MeasureName
@@ -97,11 +97,11 @@ class ForwardMeasure:
 
 @dataclass(frozen=True)
 class JointMeasure:
-    """By how much the proximal sensor's forward axis exceeds the distal one's, as their joint says.
+    """Heading of the proximal sensor's forward axis minus that of the distal one, as measured at their joint.
 
     Parameters
     ----------
-    turn : rad, from rest world to rest world. sd, doubt : as of `ForwardMeasure`.
+    turn : rad, between the two rest frames. sd, doubt : as in `ForwardMeasure`.
     """
 
     proximal: Segment
@@ -113,11 +113,11 @@ class JointMeasure:
 
 @dataclass(frozen=True)
 class ForwardVote:
-    """A measure after all were heard.
+    """A measure after the joint estimation.
 
     Parameters
     ----------
-    angle : rad in the sensor's rest world. share : probability that it is right, given the result.
+    angle : rad in the sensor's rest frame. share : posterior probability that it is right.
     """
 
     source: MeasureName
@@ -127,13 +127,13 @@ class ForwardVote:
 
 @dataclass(frozen=True)
 class WeighedForward:
-    """The forward axis of one sensor.
+    """Estimated forward axis of one sensor.
 
     Parameters
     ----------
-    angle : the most probable one in the sensor's rest world, rad. sd : within so much of it lies 68 % of the
-    probability of its half circle, rad: the standard deviation of a normal one, and not blown up by a small
-    chance of anything.
+    angle : posterior mode in the sensor's rest frame, rad. sd : half width of the interval with 68 % of the
+    probability of the surrounding half circle, rad: equals the standard deviation of a normal distribution
+    and is robust to heavy tails.
     """
 
     angle: float
@@ -146,16 +146,16 @@ def weigh_forward_axes(
     joints: Sequence[JointMeasure],
     mirrors: Mapping[Segment, ForwardMeasure],
 ) -> dict[Segment, WeighedForward]:
-    """Weigh all measures of all forward axes.
+    """Combine all measures of all forward axes.
 
     Parameters
     ----------
-    measures : segment → those of itself. joints : those of two sensors. mirrors : segment → its main axis of
-    turning; left and right are off forward by the same angle the other way round.
+    measures : segment → its own measures. joints : measures between two sensors. mirrors : segment → its main
+    rotation axis; left and right deviate from forward by the same angle in opposite directions.
 
     Returns
     -------
-    Segment → the most probable angle, its deviation, and every vote.
+    Segment → the most probable angle, its standard deviation, and the share of every measure.
     """
     heard = [j for j in joints if j.proximal in measures and j.distal in measures]
     found = {s: _locate(p) for s, p in _find_marginals(measures, heard, mirrors) if s in measures}
@@ -166,7 +166,7 @@ def weigh_forward_axes(
 
 
 def _spread(off: Floats, sd: float, doubt: float) -> Floats:
-    """Density at these deviations in rad: von Mises, or with probability `doubt` anything."""
+    """Density at these deviations in rad: von Mises, mixed with a uniform one of weight `doubt`."""
     kappa = 1.0 / max(sd, NARROWEST) ** 2
     # for κ of this size the von Mises density is √(κ/2π) exp(κ (cos x − 1)) to within 1 %
     right = np.sqrt(kappa / (2.0 * pi)) * np.exp(kappa * (np.cos(off) - 1.0))
@@ -178,10 +178,10 @@ def _find_marginals(
     joints: Sequence[JointMeasure],
     mirrors: Mapping[Segment, ForwardMeasure],
 ) -> Iterator[tuple[Segment, Floats]]:
-    """Every sensor's posterior (cells,), unnormalised: sums over all the others (sum-product, exact).
+    """Unnormalised posterior (cells,) of every sensor, marginalised over all others (exact sum-product).
 
-    Left and right of a level are one pair of angles, so that the chain has no loop. A sensor outside it, on
-    the chest, has no joint here to any other and is heard alone.
+    Left and right of a level form one pair of angles, so that the chain has no loop. A sensor outside it, on
+    the chest, has no joint with any other and is estimated on its own.
     """
     links = {j.distal: _link(j) for j in joints}
 
@@ -226,12 +226,14 @@ def _find_marginals(
 
 
 def _link(joint: JointMeasure) -> Floats:
-    """Density (proximal cells, distal cells) of two angles beside a joint."""
+    """Density (proximal cells, distal cells) of the two angles at a joint."""
     return _spread(ANGLES[:, None] - ANGLES - joint.turn, joint.sd, joint.doubt)
 
 
 def _mirror(left: ForwardMeasure, right: ForwardMeasure) -> Floats:
-    """Density (left cells, right cells): what one side's axis turns inward, the other's does."""
+    """Density (left cells, right cells) under mirror symmetry: both axes are rotated inward by the same
+    angle.
+    """
     sd, doubt = max(left.sd, right.sd), max(left.doubt, right.doubt)
     return _spread(ANGLES[:, None] + ANGLES - left.angle - right.angle, sd, doubt)
 
@@ -241,7 +243,7 @@ def _scale(density: Floats) -> Floats:
 
 
 def _locate(density: Floats) -> tuple[float, float]:
-    """The mean around the highest peak, rad, and the deviation from it that holds 68 % of all."""
+    """Mean around the highest peak, rad, and the half width that contains 68 % of the probability."""
     p = density / density.sum()
     peak = ANGLES[int(np.argmax(p))]
     near = np.abs(wrap_angle(ANGLES - peak)) <= PEAK
@@ -262,7 +264,7 @@ def _hear(
     mirrors: Mapping[Segment, ForwardMeasure],
     found: Mapping[Segment, tuple[float, float]],
 ) -> Iterator[ForwardVote]:
-    """What each measure says of this axis, the others taken as they were found."""
+    """Posterior share of each measure of this axis, given the estimates of the other sensors."""
     angle = found[segment][0]
 
     def vote(source: MeasureName, says: float, sd: float, doubt: float) -> ForwardVote:

@@ -1,4 +1,4 @@
-"""Where is forward in a sensor that nobody stood still with: axes of straight walking, and their signs."""
+"""Anterior axis of sensors without quiet standing: axes from straight walking, and their signs."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ from sagittal.core.calibration.walking import (
 )
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_vertical, rotate
 from sagittal.core.signals.filtering import low_pass
 from sagittal.core.signals.recording import UniformRecording
@@ -61,8 +62,8 @@ class NeutralSensor:
 
     Parameters
     ----------
-    up : (3,) vertical in sensor axes in that posture. q : (n, 4) sensor to its own world, turned so that in
-    that posture, over the reference part, its vertical frame faces x.
+    up : (3,) vertical in sensor axes in that posture. q : (n, 4) sensor to its own world frame, rotated so
+    that in that posture its vertical frame faces x over the reference part.
     """
 
     up: Floats
@@ -79,7 +80,9 @@ def find_forward_in_walk(
     method: Method,
     weights: ForwardParams,
 ) -> tuple[dict[Segment, AnteriorAxis], list[Notice]]:
-    """Anterior axis of every sensor whose sign can be told, by itself, and what is to be said of others."""
+    """Anterior axis of every sensor whose sign can be determined independently, and notices about the
+    others.
+    """
     found: dict[Segment, AnteriorAxis] = {}
     notices: list[Notice] = []
     pushed: dict[Segment, Floats] = {}
@@ -114,13 +117,13 @@ def find_forward_in_walk(
 
 @dataclass(frozen=True, eq=False)
 class _WalkedAxis:
-    """An axis of one sensor whose forward end is not told yet.
+    """Axis of one sensor whose forward end is not yet determined.
 
     Parameters
     ----------
-    angle : rad. share : how clear it is. directed : it is the direction of a foot's strides, which has a
-        sign. seen : axis of the acceleration, None by gyro PCA. vaulting : agreement of a trunk's rise with
-        the direction, 0 for the others. push : slow acceleration along the axis.
+    angle : rad. share : its distinctness. directed : the direction of a foot's strides, which has a sign.
+    seen : axis of the acceleration, None with gyro PCA. vaulting : agreement of a trunk's vertical movement
+    with the direction, 0 for other segments. push : slow acceleration along the axis.
     """
 
     angle: float
@@ -141,7 +144,7 @@ def _find_axis(
     params: HeadingParams,
     by_gyro: bool,
 ) -> _WalkedAxis:
-    """The axis by gyro PCA, or by strides, or by the acceleration."""
+    """The axis by gyro PCA, by strides, or by the acceleration."""
     signals, rate = recording.sensors[segment], recording.rate_hz
     a = horizontal_acceleration(x.q, signals.acc)
     if by_gyro:
@@ -170,7 +173,7 @@ def _list_measures(
     mask: Bools,
     weights: ForwardParams,
 ) -> tuple[tuple[ForwardMeasure, ...], ForwardMeasure | None]:
-    """What speaks of the forward axis, and what the other side may use."""
+    """Measures of the forward axis, and the one for use by the other side."""
     if axis.seen is None:
         return (ForwardMeasure("gyro_pca", angle, weights.pca_sd, weights.pca_doubt),), None
     gyr = recording.sensors[segment].gyr[mask] - x.sensor.gyro_bias
@@ -182,7 +185,7 @@ def _list_measures(
 
 
 def _in_order(worn: Mapping[Segment, object]) -> Iterator[Segment]:
-    """Sensors that tell their sign by themselves first: shanks, then feet, thighs, the trunk."""
+    """Sensors in the order in which their sign can be determined: shanks first, then feet, thighs, trunk."""
     for group in (SHANK, FOOT, THIGH):
         yield from (group[side] for side in SIDES if group[side] in worn)
     yield from (s for s in TRUNK if s in worn)
@@ -197,7 +200,7 @@ def _sign(
     pushed: Mapping[Segment, Floats],
     least_vaulting: float,
 ) -> tuple[float, str, tuple[Notice, ...]]:
-    """The end of the axis that is forward, what told it, and what to say.
+    """Forward end of the axis, the evidence used, and notices.
 
     Raises
     ------
@@ -215,8 +218,11 @@ def _sign(
             return (axis if vaulting > 0 else nearest_sign(axis, axis + np.pi)), "pendulum", ()
         raise CalibrationError(
             "pelvis_heading_unknown",
-            f"{segment}: which way it faces is not known without standing. Stand still for 3 s before "
-            "walking, or declare the mounting, for example “sacrum, face backwards”.",
+            Message(
+                "{segment}: which way it faces is not known without standing. Stand still for 3 s "
+                "before walking, or declare the mounting, for example “sacrum, face backwards”.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     for other, theirs in pushed.items():
@@ -236,8 +242,11 @@ def _sign(
     else:
         raise CalibrationError(
             "forward_unknown",
-            f"{segment}: which way is forward cannot be told from it alone. Wear a sensor on the shank or "
-            "foot of that leg, or declare the mounting.",
+            Message(
+                "{segment}: which way is forward cannot be told from it alone. Wear a sensor on the "
+                "shank or foot of that leg, or declare the mounting.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     weak = () if clear else (_weak(segment),)
@@ -245,7 +254,7 @@ def _sign(
 
 
 def _push(a: Complexes, axis: float, parts: list[Part], bearing: list[float], rate_hz: float) -> Floats:
-    """Slow acceleration along an axis over all parts, one after the other, each without its mean."""
+    """Slow acceleration along an axis over all parts, concatenated, each with its mean removed."""
     pieces = []
     for (start, end), turn in zip(parts, bearing, strict=True):
         x = low_pass((a[start:end] * np.exp(-1j * (axis + turn))).real, SWING_HZ, rate_hz)
@@ -256,14 +265,17 @@ def _push(a: Complexes, axis: float, parts: list[Part], bearing: list[float], ra
 def _weak(segment: Segment) -> Notice:
     return Notice(
         "calibration_sign_weak",
-        f"{segment}: forward and backward are hard to tell apart in this walk. Declare the mounting, or "
-        "check the sign of its angles.",
+        Message(
+            "{segment}: forward and backward are hard to tell apart in this walk. Declare the "
+            "mounting, or check the sign of its angles.",
+            segment=segment,
+        ),
         sensor=segment,
     )
 
 
 def mask_of(n: int, parts: list[Part]) -> Bools:
-    """Samples (n,) of the parts."""
+    """Mask (n,) of the samples in the parts."""
     mask = np.zeros(n, np.bool_)
     for a, b in parts:
         mask[a:b] = True

@@ -1,8 +1,8 @@
-"""Calibration of a take in which nobody stands still: posture and forward axis of every sensor from walking.
+"""Calibration of a recording without quiet standing: posture and forward axis of every sensor from walking.
 
-The neutral posture of a foot is the one it has flat on the floor; that of any other segment is its mean
-posture over straight walking, so its angles have a shape and a range and no level. Forward is the direction
-of walking (docs/science/calibration.md, "Without standing").
+The neutral posture of a foot is foot-flat; that of any other segment is its mean posture over straight
+walking, so its angles have a meaningful shape and range but no absolute level. Forward is the direction of
+walking (docs/science/calibration.md, "Without standing").
 """
 
 from __future__ import annotations
@@ -68,20 +68,21 @@ def calibrate_from_walking(
     forward: ForwardParams,
     joint_turns: JointTurnParams,
 ) -> CalibratedRecording:
-    """Calibrate without a standing.
+    """Calibrate without quiet standing.
 
     Parameters
     ----------
-    why : what was wrong with standing; raised when walking cannot replace it. rests : pauses in mid-stride.
+    why : the reason for rejecting standing; raised if walking cannot replace it. rests : pauses in
+    mid-stride.
 
     Returns
     -------
-    CalibratedRecording with `posture` "walking". A sensor whose forward cannot be found is left out with a
-    notice.
+    CalibratedRecording with `posture` "walking". A sensor whose forward axis cannot be determined is omitted
+    with a notice.
 
     Raises
     ------
-    SignalError `why`, where nobody walks for long enough either. CalibrationError of the first sensor when
+    SignalError `why` if there is no sufficiently long walk either. CalibrationError of the first sensor if
     none can be calibrated.
     """
     rate = recording.rate_hz
@@ -129,7 +130,7 @@ def _follow_sensors(
     params: WalkRungParams,
     why: SignalError,
 ) -> tuple[dict[Segment, SensorInWalk], Bools, Bools]:
-    """Every sensor through the walks, and the samples (n,) in which the person moves, and those of turns."""
+    """Track every sensor through the walks; also the samples (n,) of movement and of turns."""
     rate = recording.rate_hz
     moving = moving_mask(recording, walking)
     walks = [r for r in find_runs(moving) if r[1] - r[0] >= params.least_s * rate]
@@ -155,7 +156,7 @@ def _follow_sensors(
 def _bearings(
     recording: UniformRecording, sensors: Mapping[Segment, SensorInWalk], parts: list[Part], home: Part
 ) -> list[float]:
-    """Turn of each part about the vertical since the reference part, rad."""
+    """Heading change of each part relative to the reference part, rad."""
     show = turn_sensors(recording)
     turns = []
     for p in parts:
@@ -169,7 +170,7 @@ def _bearings(
 
 
 def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], home: Part) -> NeutralSensor:
-    """Posture of a foot that is flat, or the mean of straight walking."""
+    """Posture of a flat foot, or mean posture of straight walking."""
     q, n = sensor.q, len(sensor.q)
     seen, here = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
     for a, b in parts:

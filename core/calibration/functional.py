@@ -1,7 +1,8 @@
-"""Movements done for the calibration: swings of one leg from the hip, and bows of the trunk.
+"""Functional calibration movements: swings of one leg from the hip, and bows of the trunk.
 
-Both turn a segment about its medio-lateral axis, which the principal axis of its rate shows (Nazarahari 2021,
-thesis, ch. 3). Where they are is found by what stays still meanwhile: the other leg, or both feet.
+Both rotate a segment about its medio-lateral axis, which is the principal axis of its angular rate
+(Nazarahari 2021, thesis, ch. 3). They are detected by the segments that remain still: the other leg, or both
+feet.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from sagittal.core.calibration.standing import SensorAtRest, vertical_frame
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import FOOT, SHANK, SIDES, THIGH, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_lengths, find_vertical
 from sagittal.core.signals.recording import UniformRecording
@@ -52,14 +54,15 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class FunctionalParams:
-    """What counts as swings and bows (docs/science/calibration.md, "Swings and bows").
+    """Detection of swings and bows (docs/science/calibration.md, "Swings and bows").
 
     Parameters
     ----------
-    swing_s, bow_s : rates are averaged over so long. swing_rate, bow_rate : of the leg and of the trunk
-        meanwhile, rad/s. still_rate : of the other leg, or of feet and shanks. still_share : of these over
-        the one that moves. pause_s : a shorter break is part of it. shortest_s : of the whole.
-    swings, bows : repetitions that are asked for; with half of them the axis is used, and told.
+    swing_s, bow_s : averaging time of the rates. swing_rate, bow_rate : minimum rates of the leg and of the
+    trunk, rad/s. still_rate : maximum rate of the other leg, or of feet and shanks. still_share : maximum
+    ratio of that to the rate of the moving segment. pause_s : shorter breaks are bridged. shortest_s :
+    minimum total duration.
+    swings, bows : requested repetitions; with at least half of them the axis is used, with a notice.
     """
 
     swing_s: float = 1.5
@@ -76,11 +79,12 @@ class FunctionalParams:
 
 @dataclass(frozen=True, eq=False)
 class FunctionalMovements:
-    """Where they are.
+    """Samples of the functional movements.
 
     Parameters
     ----------
-    swings : side → (n,) that leg swings and the other stands. bows : (n,) the trunk bows over still feet.
+    swings : side → (n,) that leg swings while the other supports. bows : (n,) the trunk bows with the feet
+    still.
     """
 
     swings: Mapping[Side, Bools]
@@ -88,11 +92,11 @@ class FunctionalMovements:
 
     @property
     def anywhere(self) -> Bools:
-        """Samples (n,) of any of them: nobody walks there."""
+        """Samples (n,) of any of them, to be excluded from walking."""
         return np.asarray(np.logical_or.reduce([*self.swings.values(), self.bows]))
 
     def shown_by(self, segment: Segment) -> tuple[FunctionalMethod, Bools]:
-        """The movement that shows the axis of a segment, and when."""
+        """The movement that reveals the axis of a segment, and its samples."""
         if segment in TRUNK:
             return "trunk_bow", self.bows
         side = next(s for s in SIDES if segment in (THIGH[s], SHANK[s], FOOT[s]))
@@ -100,10 +104,10 @@ class FunctionalMovements:
 
 
 def find_functional_movements(recording: UniformRecording, params: FunctionalParams) -> FunctionalMovements:
-    """Find swings and bows; a take in which nobody did any has none.
+    """Detect swings and bows; recordings without them are valid too.
 
-    The other leg needs a sensor, and for bows both shanks or feet: a single sensor does not tell a swing
-    from a step.
+    The other leg must carry a sensor, and for bows both shanks or feet: with a single sensor a swing cannot
+    be distinguished from a step.
     """
     worn, rate = recording.sensors, recording.rate_hz
     legs = {side: [s for s in (THIGH[side], SHANK[side], FOOT[side]) if s in worn] for side in SIDES}
@@ -137,11 +141,11 @@ def find_functional_axes(
     params: FunctionalParams,
     forward: ForwardParams,
 ) -> dict[Segment, AnteriorAxis]:
-    """Anterior axis of every sensor whose segment was swung or bowed often enough.
+    """Anterior axis of every sensor with enough repetitions of its segment's movement.
 
     Parameters
     ----------
-    q : segment → (n, 4) sensor to its rest world.
+    q : segment → (n, 4) sensor to its rest frame.
     """
     found: dict[Segment, AnteriorAxis] = {}
     for segment, signals in recording.sensors.items():
@@ -172,11 +176,11 @@ def find_functional_axes(
 
 
 def _give_sign(axis: float, how: FunctionalMethod, up: Floats, R_vertical: Floats) -> tuple[float, float]:
-    """The end of an axis that is forward, and how clear that is, rad: legs swing forward, trunks bow forward.
+    """Forward end of an axis, and how clear that is, rad: legs swing forward, trunks bow forward.
 
     Parameters
     ----------
-    up : (m, 3) the vertical in the sensor while it moves.
+    up : (m, 3) the vertical in sensor axes during the movement.
     """
     bend = float(sagittal_angle(up, about_vertical(-axis) @ R_vertical).mean())
     forward = bend * FORWARD[how]
@@ -190,21 +194,40 @@ def _tell(
     told = []
     if done < asked:
         message = (
-            f"{segment}: calibration saw {done} {plural(done, 'swing', 'swings')}, {asked} or more are good."
+            Message(
+                f"{{segment}}: calibration saw {{done}} {plural(done, 'swing', 'swings')}, {{asked}} or "
+                "more are good.",
+                segment=segment,
+                done=done,
+                asked=asked,
+            )
             if how == "hip_swing"
-            else f"{segment}: calibration saw {done} {plural(done, 'bow', 'bows')}, {asked} or more are good."
+            else Message(
+                f"{{segment}}: calibration saw {{done}} {plural(done, 'bow', 'bows')}, {{asked}} or more "
+                "are good.",
+                segment=segment,
+                done=done,
+                asked=asked,
+            )
         )
         told.append(Notice("few_repetitions", message, sensor=segment))
     if rho < GOOD_AXIS:
-        message = (
-            f"{segment}: in the {what} the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} "
-            "or more is good. Move in one plane."
+        message = Message(
+            "{segment}: in the {what} the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} "
+            "or more is good. Move in one plane.",
+            segment=segment,
+            what=what,
+            rho=rho,
+            GOOD_AXIS=GOOD_AXIS,
         )
         told.append(Notice("not_single_axis", message, sensor=segment))
     if margin < WEAK_MARGIN:
-        message = (
-            f"{segment}: forward and backward are hard to tell apart in these {what}; {further} further "
-            "forward than back, or declare the mounting."
+        message = Message(
+            "{segment}: forward and backward are hard to tell apart in these {what}; {further} "
+            "further forward than back, or declare the mounting.",
+            segment=segment,
+            what=what,
+            further=further,
         )
         told.append(Notice("calibration_sign_weak", message, sensor=segment))
     return told
@@ -241,7 +264,7 @@ def _drop_steps(seen: Bools, mine: Floats, theirs: Floats, rate_hz: float) -> Bo
 
 
 def _widen(seen: Bools, rate_hz: float) -> Bools:
-    """The same (n,) with its edges, where a movement begins and ends slowly."""
+    """The movement (n,) including its edges, where it begins and ends slowly."""
     wide, edge = seen.copy(), round(EDGE_S * rate_hz)
     for a, b in find_runs(seen):
         wide[max(0, a - edge) : b + edge] = True
@@ -249,7 +272,7 @@ def _widen(seen: Bools, rate_hz: float) -> Bools:
 
 
 def _join(seen: Bools, rate_hz: float, params: FunctionalParams) -> Bools:
-    """Runs (n,) with breaks of up to `pause_s` closed, those of `shortest_s` and more."""
+    """Runs (n,) with breaks of up to `pause_s` closed; only those of at least `shortest_s`."""
     joined = seen.copy()
     for a, b in find_runs(~seen):
         if a > 0 and b < len(seen) and b - a <= params.pause_s * rate_hz:

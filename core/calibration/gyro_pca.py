@@ -1,8 +1,8 @@
 """The flexion axis as principal axis of the angular rate, and the sign rules of gait.
 
-Nazarahari 2021 (thesis), ch. 3, with the corrections of
-docs/science/calibration.md, "Flexion axis by gyro PCA": rows instead of columns in Eq 14, another seed axis
-when the sensor's x is vertical, γ = atan2(−p_x, p_z) instead of Eq 15.
+Nazarahari 2021 (thesis), ch. 3, with the corrections of docs/science/calibration.md, "Flexion axis by gyro
+PCA": rows instead of columns in Eq 14, a different seed axis if the sensor's x is vertical, γ = atan2(−p_x,
+p_z) instead of Eq 15.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import CalibrationError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_vertical
 from sagittal.core.signals.held_samples import cut_blocks
 
@@ -29,11 +30,12 @@ WEAK_MARGIN = radians(5.0)
 
 @dataclass(frozen=True, eq=False)
 class FlexionAxis:
-    """The axis a segment turns about, sign still open.
+    """Rotation axis of a segment with undetermined sign.
 
     Parameters
     ----------
-    gamma : rad, R_y(γ) R_vertical has z along the axis or against it. rho : share of the first component.
+    gamma : rad, R_y(γ) R_vertical has z parallel or antiparallel to the axis. rho : explained share of the
+    first component.
     """
 
     gamma: float
@@ -42,7 +44,7 @@ class FlexionAxis:
 
 @dataclass(frozen=True)
 class MainAxis:
-    """First principal axis (x, z) of horizontal rates, without a sign, and its share of both components."""
+    """First principal axis (x, z) of horizontal rates, with arbitrary sign, and its share of the variance."""
 
     x: float
     z: float
@@ -58,7 +60,7 @@ def measure_main_axis(horizontal: Floats) -> MainAxis:
 
 
 def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionAxis:
-    """Find the turn of the vertical frame about its y that lays z along the axis the segment turns about.
+    """Rotation of the vertical frame about its y axis that aligns z with the rotation axis of the segment.
 
     Parameters
     ----------
@@ -66,23 +68,28 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
 
     Raises
     ------
-    CalibrationError `not_single_axis` when the movement has no main axis (ρ < 0.70).
+    CalibrationError `not_single_axis` if the movement has no dominant axis (ρ < 0.70).
     """
     found = measure_flexion(rate, R_vertical)
     rho = found.rho
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
-            f"{segment}: the movement has no single axis, the first component holds {rho:.0%} of it, at "
-            f"least {SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or calibrate by "
-            "walking direction.",
+            Message(
+                "{segment}: the movement has no single axis, the first component holds {rho:.0%} of "
+                "it, at least {SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or "
+                "calibrate by walking direction.",
+                segment=segment,
+                rho=rho,
+                SINGLE_AXIS=SINGLE_AXIS,
+            ),
             sensor=segment,
         )
     return found
 
 
 def measure_flexion(rate: Floats, R_vertical: Floats) -> FlexionAxis:
-    """The same for rates (n, 3) in sensor coordinates, however many axes they have."""
+    """Like `flexion_axis`, for rates (n, 3) in sensor coordinates, without a check for a dominant axis."""
     found = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
     return FlexionAxis(float(np.arctan2(-found.x, found.z)), found.share)
 
@@ -94,7 +101,7 @@ def about_vertical(gamma: float) -> Floats:
 
 
 def sagittal_angle(up: Floats, R_segment_sensor: Floats) -> Floats:
-    """Sagittal inclination (n,) in rad, distal end forward positive, from the vertical (n, 3) in the sensor.
+    """Sagittal inclination (n,) in rad, distal end forward positive, from the vertical (n, 3) in sensor axes.
 
     From inclination, not from an integrated rate: 6 of 6 signs right (docs/science/calibration.md, "Signs").
     """
@@ -103,7 +110,7 @@ def sagittal_angle(up: Floats, R_segment_sensor: Floats) -> Floats:
 
 
 def sagittal_course(q: Floats, R_segment_sensor: Floats) -> Floats:
-    """The same (n,) of orientations (n, 4) of the sensor in a world whose z is up."""
+    """Sagittal inclination (n,) from orientations (n, 4) of the sensor in a world frame with z up."""
     angle = np.empty(len(q))
     for part in cut_blocks(len(q)):
         angle[part] = sagittal_angle(find_vertical(q[part]), R_segment_sensor)
@@ -111,10 +118,10 @@ def sagittal_course(q: Floats, R_segment_sensor: Floats) -> Floats:
 
 
 def gait_margin(angle: Floats, walking: Bools, segment: Segment) -> float:
-    """How clearly the sagittal angle is the right way round, rad; negative: the wrong way round.
+    """Margin by which the sagittal angle has the correct sign, rad; negative: the wrong sign.
 
-    In walking, heel rise tips foot and shank further back than they ever tip forward, and the thigh swings
-    further forward than back (docs/science/calibration.md, "Signs"; percentiles 2 and 98).
+    In walking, heel rise tips foot and shank further backward than they ever tip forward, and the thigh
+    swings further forward than backward (docs/science/calibration.md, "Signs"; percentiles 2 and 98).
     """
     low, high = np.percentile(angle[walking], [2.0, 98.0])
     margin = abs(high) - abs(low) if segment.startswith("thigh") else abs(low) - abs(high)
@@ -122,20 +129,22 @@ def gait_margin(angle: Floats, walking: Bools, segment: Segment) -> float:
 
 
 def count_steps(angle: Floats, walking: Bools) -> int:
-    """Steps in a walk (n,) by the sagittal angle (n,) of a leg sensor: two for each time that it rises from
+    """Number of steps in a walk (n,) from the sagittal angle (n,) of a leg sensor: two for each rise from
     its lower into its upper third.
     """
     return 2 * int(np.count_nonzero(np.diff(_tell_thirds(angle[walking])) > 0))
 
 
 def count_repetitions(angle: Floats) -> int:
-    """How often an angle (n,) comes into its upper third, the lower third between; from rest anywhere."""
+    """Number of times an angle (n,) enters its upper third after visiting the lower one, starting from any
+    position.
+    """
     state = _tell_thirds(angle)
     return int(np.count_nonzero(np.diff(state) > 0)) + int(len(state) > 0 and state[0] > 0)
 
 
 def _tell_thirds(x: Floats) -> NDArray[np.int64]:
-    """Where x (n,) is in its upper third (1) or lower third (−1), the samples between left out."""
+    """Samples of x (n,) in its upper third (1) or lower third (−1); samples in between are dropped."""
     low, high = np.percentile(x, [2.0, 98.0])
     state = np.where(x > high - (high - low) / 3, 1, np.where(x < low + (high - low) / 3, -1, 0))
     return np.asarray(state[state != 0])

@@ -1,12 +1,12 @@
-"""The direction of walking in each sensor's own world, from its accelerometer and gyroscope alone.
+"""The direction of walking in each sensor's own world frame, from its accelerometer and gyroscope alone.
 
-Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world whose heading is arbitrary;
-the direction of walking, seen in each of them, is what they have in common
-(docs/science/calibration.md, "Direction of walking").
+Horizontal vectors are complex numbers x + iy. Every sensor has its own z-up world frame with arbitrary
+heading; the direction of walking is what all sensors have in common (docs/science/calibration.md, "Direction
+of walking").
 
-Measures, all over the straight parts of a walk, each part turned back by the angle walked since the first:
-- rest-to-rest velocity with linear de-drift: ≤ 2° on a short walk out and back; of a foot every stride is
-  from rest to rest;
+Measures, all over the straight parts of a walk, each rotated back by the change of direction since the first:
+- rest-to-rest velocity with linear drift removal: ≤ 2° on a short walk out and back; for a foot every stride
+  is from rest to rest;
 - principal axis of the horizontal acceleration below 4 Hz: legs ≤ 3.4°, any length of walk, without a sign.
 """
 
@@ -37,22 +37,23 @@ LONGEST_STRIDE_S: Final = 2.5
 
 @dataclass(frozen=True)
 class HeadingParams:
-    """How directions are found.
+    """Estimation of walking directions.
 
     Parameters
     ----------
     cutoff_hz : low-pass of the acceleration before its principal axis
         (docs/science/calibration.md, "Parameters").
-    longest_velocity_s : longest time between two rests over which velocity is integrated, s. An accelerometer
-        bias of 0.05 m/s² that the linear de-drift leaves over to 10 % bends a 1 m/s walk by 7° after 25 s.
-    start_s : part of the walk next to a rest over which its velocity is averaged for a sign, s. leg_gap_s,
-        trunk_gap_s : time between rest and straight part up to which that works. Legs have the gait rule
-        besides; a trunk has nothing else, and a bias of 0.05 m/s² leaves the sign of 1 m/s right for 8 s.
+    longest_velocity_s : longest time between two rests over which velocity is integrated, s. If linear drift
+    removal leaves 10 % of an accelerometer bias of 0.05 m/s², the direction of a 1 m/s walk is off by 7°
+    after 25 s.
+    start_s : part of the walk next to a rest used to average the velocity for a sign, s. leg_gap_s,
+    trunk_gap_s : longest time between rest and straight part for this. Legs can also use the gait rule; a
+    trunk has no other evidence, and with a bias of 0.05 m/s² the sign of 1 m/s is right for 8 s.
     speed : plausible walking speed, m/s.
-    coherence : least agreement of the parts' velocities, 0 to 1.
-    reach_s : parts that start further from the rest are left out: heading drifts.
-    pendulum : agreement from which a pelvis' sign is believed (`pendulum_agreement`). On 24 real takes of six
-        people it is .60 to .86; virtual people, whose pelvis has no dynamics, have up to .44 of either sign.
+    coherence : minimum agreement of the velocities of the parts, 0 to 1.
+    reach_s : parts that start further from the rest are ignored because heading drifts.
+    pendulum : minimum agreement to accept a pelvis sign (`pendulum_agreement`). In 24 real recordings of six
+    people it is .60 to .86; simulated people, whose pelvis has no dynamics, reach .44 with either sign.
     """
 
     cutoff_hz: float = 4.0
@@ -68,12 +69,13 @@ class HeadingParams:
 
 @dataclass(frozen=True)
 class WalkingDirection:
-    """A direction of walking in a sensor's world.
+    """A direction of walking in a sensor's world frame.
 
     Parameters
     ----------
-    angle : rad from x towards y. score : 0 to 1; velocity: agreement of the parts, |Σ v| / Σ |v|; axis: share
-    of the larger principal component less the smaller. speed_mps : of a velocity, 0 of an axis.
+    angle : rad from x towards y. score : 0 to 1; for a velocity: agreement of the parts, |Σ v| / Σ |v|; for
+    an axis: share of the larger principal component minus that of the smaller. speed_mps : of a velocity, 0
+    for an axis.
     """
 
     angle: float
@@ -88,7 +90,7 @@ def horizontal_acceleration(q: Floats, acc: Floats) -> Complexes:
 
 
 def rest_to_rest_velocity(a: Complexes, rests_at_end: bool, rate_hz: float) -> Complexes:
-    """Velocity (n,) in m/s since a rest; with a rest at the end too, its linear drift is removed."""
+    """Velocity (n,) in m/s since a rest; if it also ends in a rest, its linear drift is removed."""
     v = np.cumsum(a) / rate_hz
     u = np.linspace(0.0, 1.0, len(v)) if rests_at_end else np.zeros(len(v))
     return np.asarray(v - u * v[-1])
@@ -97,9 +99,9 @@ def rest_to_rest_velocity(a: Complexes, rests_at_end: bool, rate_hz: float) -> C
 def velocity_direction(
     v: Complexes, offset: int, parts: list[Part], bearing: list[float], params: HeadingParams
 ) -> WalkingDirection | None:
-    """Direction of the mean velocity over the parts, each turned back by its bearing; None if implausible.
+    """Direction of the mean velocity over the parts, each rotated back by its bearing; None if implausible.
 
-    For a walk out and back this is mean(out) − mean(back): a constant velocity error cancels.
+    For a walk out and back this is mean(out) − mean(back), in which a constant velocity error cancels.
 
     Parameters
     ----------
@@ -129,9 +131,9 @@ def stride_direction(
     rate_hz: float,
     params: HeadingParams,
 ) -> WalkingDirection | None:
-    """Direction of a foot's mean velocity from one flat moment to the next; None if implausible.
+    """Direction of a foot's mean velocity between foot-flat moments; None if implausible.
 
-    A flat foot stands still for a moment, so every stride lies between two rests of its own.
+    A flat foot is momentarily at rest, so every stride starts and ends with zero velocity.
 
     Parameters
     ----------
@@ -159,16 +161,16 @@ def start_direction(
     longest_gap_s: float,
     params: HeadingParams,
 ) -> WalkingDirection | None:
-    """Direction from the velocity gained since a rest (lost until it), good enough for a sign.
+    """Direction from the velocity gained since a rest (or lost until it), accurate enough for a sign.
 
     Parameters
     ----------
-    part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest is before
-        it. longest_gap_s : time between them up to which the sign is worth something.
+    part : the straight part next to the rest, turned by `turn` rad since standing. leads : the rest precedes
+    it. longest_gap_s : longest time between them for a reliable sign.
 
     Returns
     -------
-    None when rest and part are further apart than that, or the speed is implausible.
+    None if rest and part are further apart than that, or the speed is implausible.
     """
     edge = round(rest[1] * rate_hz) if leads else round(rest[0] * rate_hz)
     gap = (part[0] - edge) if leads else (edge - part[1])
@@ -198,8 +200,8 @@ def acceleration_axis(
 
     Parameters
     ----------
-    steps_s : step time in each part for a trunk sensor: a(t) + a(t + step) is what both steps share, which is
-        forward; what changes side with every step, the sway, cancels. None for the legs.
+    steps_s : step time in each part for a trunk sensor: a(t) + a(t + step) retains the forward component
+    common to both steps, while lateral sway, which alternates with every step, cancels. None for the legs.
     """
     power, moment = 0.0, 0j
     for (start, end), turn, step_s in zip(parts, bearing, steps_s or [0.0] * len(parts), strict=True):
@@ -219,10 +221,11 @@ def acceleration_axis(
 
 
 def step_time(up: Floats, rate_hz: float) -> float:
-    """Step time in s from the vertical acceleration (n,) of the trunk over a straight part, 0 if it has none.
+    """Step time in s from the vertical acceleration (n,) of the trunk over a straight part, 0 if
+    undetermined.
 
     The first peak of the autocorrelation between 0.3 and 1.2 s, the range of walking, that is nearly as high
-    as the highest: the highest may be the stride.
+    as the highest one, which may be the stride.
     """
     low, high = round(0.3 * rate_hz), round(1.2 * rate_hz)
     x = up - up.mean()
@@ -245,16 +248,17 @@ def pendulum_agreement(
     rate_hz: float,
     steps_s: list[float],
 ) -> float:
-    """How well a direction is the forward one of a trunk that vaults over its legs, −1 to 1; 0 = cannot say.
+    """Agreement of a direction with the forward direction of a trunk in inverted-pendulum gait, −1 to 1; 0 =
+    undetermined.
 
     A walking trunk is slowest where it is highest (Cavagna et al. 1977), so its forward acceleration follows
-    the rate at which its vertical acceleration rises: their correlation at step frequency, both averaged with
-    themselves a step later.
+    the rate of change of its vertical acceleration: their correlation at step frequency, both averaged with
+    themselves one step later.
 
     Parameters
     ----------
     a, up : (n,) horizontal acceleration in the sensor's world and vertical specific force, m/s².
-    steps_s : step time in each part, 0 = none.
+    steps_s : step time in each part, 0 = undetermined.
     """
     both, own, rise = 0.0, 0.0, 0.0
     for (start, end), turn, step_s in zip(parts, bearing, steps_s, strict=True):
@@ -271,13 +275,13 @@ def pendulum_agreement(
 
 
 def _around_steps(x: Floats, rate_hz: float) -> Floats:
-    """The part (n,) of a signal at step frequency and its neighbourhood."""
+    """The part (n,) of a signal in a band around step frequency."""
     low, high = STEP_BAND_HZ
     return np.asarray(low_pass(x, high, rate_hz) - low_pass(x, low, rate_hz))
 
 
 def nearest_sign(axis: float, towards: float) -> float:
-    """The one of axis and axis + π that is nearer to a direction, rad in [−π, π)."""
+    """Of axis and axis + π the one nearer to a direction, rad in [−π, π)."""
     turned = axis if abs(wrap_angle(axis - towards)) <= pi / 2 else axis + pi
     return wrap_angle(turned)
 

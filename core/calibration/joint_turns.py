@@ -1,7 +1,7 @@
-"""How the two sensors beside a joint are turned against each other about the vertical, as the joint shows it.
+"""Relative heading of the two sensors at a joint, from the acceleration of the joint centre.
 
-Both see the acceleration of one point, each in its own rest world; the turn that lays one upon the other is
-the difference of their forward axes, because who stands has both segments ahead
+Both sensors observe the acceleration of one point, each in its own rest frame; the rotation that aligns the
+two is the difference of their forward axes, because in standing both segments face forward
 (docs/science/calibration.md, "Forward by likelihood").
 """
 
@@ -30,12 +30,13 @@ LEAST_CHUNKS: Final = 3
 
 @dataclass(frozen=True)
 class JointTurnParams:
-    """How sure a joint is of a turn (docs/science/calibration.md, "Forward by likelihood").
+    """Reliability of the relative heading at a joint (docs/science/calibration.md, "Forward by likelihood").
 
     Parameters
     ----------
-    sd : rad, where nothing drifts. doubt : probability that it is wrong altogether. worst_misfit : of a
-    joint's acceleration over its size, above which it says nothing. joints : how accelerations are compared.
+    sd : rad, without drift. doubt : probability of being completely wrong. worst_misfit : of the joint
+    acceleration relative to its magnitude; above it the joint is ignored. joints : comparison of
+    accelerations.
     """
 
     sd: Mapping[JointKind, float] = field(
@@ -53,11 +54,11 @@ def measure_joint_turns(
     parts: Sequence[Part],
     params: JointTurnParams,
 ) -> list[JointMeasure]:
-    """Turn of every joint both of whose sensors were calibrated, over the straight parts.
+    """Relative heading at every joint with two calibrated sensors, over the straight parts.
 
     Parameters
     ----------
-    biases : segment → (3,) rad/s. q : segment → (n, 4) sensor to its rest world.
+    biases : segment → (3,) rad/s. q : segment → (n, 4) sensor to its rest frame.
     """
     worn = list_worn_joints(q)
     if not worn or not parts:
@@ -90,7 +91,7 @@ def _measure(
     chunk: int,
     params: JointTurnParams,
 ) -> JointMeasure | None:
-    """One joint; None where it fits badly or hardly moved."""
+    """One joint; None if the fit is poor or the joint hardly moved."""
     first, second = joint
     chunks = len(terms[first]) // chunk
     if not chunks:

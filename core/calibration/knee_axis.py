@@ -1,7 +1,7 @@
-"""The hinge of the knee in the axes of thigh and shank, from their rates alone.
+"""Knee hinge axis in thigh and shank axes, from their angular rates alone.
 
-What two segments turn otherwise than about their common hinge they turn together: |ω₁ × j₁| = |ω₂ × j₂| at
-every sample, j₁ and j₂ the hinge in the axes of each (Seel et al. 2014, doi:10.3390/s140406891).
+Apart from rotation about the common hinge both segments rotate together: |ω₁ × j₁| = |ω₂ × j₂| at every
+sample, with j₁ and j₂ the hinge axis in the axes of each (Seel et al. 2014, doi:10.3390/s140406891).
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ LONGEST_STEP: Final = 0.5
 
 @dataclass(frozen=True)
 class KneeAxes:
-    """Where the hinge lies.
+    """Direction of the hinge axis.
 
     Parameters
     ----------
-    thigh, shank : its turn about the long axis of the segment from the medio-lateral axis, rad.
-    steepest : the larger angle of the two out of the segment's horizontal plane, rad.
+    thigh, shank : its rotation about the long axis of the segment relative to the medio-lateral axis, rad.
+    steepest : the larger of the two angles to the segment's transverse plane, rad.
     thigh_sd, shank_sd : standard deviations of the turns, rad.
     """
 
@@ -58,12 +58,12 @@ class KneeAxes:
 
     @property
     def apart(self) -> float:
-        """By how much the forward axes of thigh and shank disagree about it, rad."""
+        """Disagreement of the thigh and shank forward axes about the hinge, rad."""
         return self.thigh - self.shank
 
 
 def measure_knees(calibrated: CalibratedRecording) -> dict[Side, KneeAxes]:
-    """The hinge of every knee both of whose sensors were seen in enough straight walking."""
+    """Hinge axis of every knee with both sensors available in enough straight walking."""
     recording, mounted = calibrated.recording, calibrated.calibration.segments
     straight = np.zeros(len(recording.t_s), np.bool_)
     for window in calibrated.calibration.walking:
@@ -85,11 +85,11 @@ def measure_knees(calibrated: CalibratedRecording) -> dict[Side, KneeAxes]:
 
 
 def find_knee_axes(thigh: Floats, shank: Floats) -> KneeAxes:
-    """Fit the hinge by Gauss-Newton from the medio-lateral axes on.
+    """Fit the hinge axis by Gauss-Newton, starting from the medio-lateral axes.
 
     Parameters
     ----------
-    thigh, shank : (n, 3) rates without bias in segment axes, rad/s, at the same samples.
+    thigh, shank : (n, 3) bias-corrected rates in segment axes, rad/s, at the same samples.
     """
     thin = max(1, len(thigh) // MOST_SAMPLES)
     first, second = thigh[::thin], shank[::thin]

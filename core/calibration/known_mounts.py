@@ -1,8 +1,8 @@
-"""Calibration of a take whose mountings are known: its rest is to be found, and whether they hold.
+"""Calibration of a recording with known sensor alignment: find its rest, and verify the alignment.
 
-A mounting that was agreed on and not kept gives wrong angles with confidence. In standing the long axis of a
-segment is about vertical; who squats turns thigh and shank about the axis to the right, the shank forward and
-the thigh backward.
+An alignment that differs from the protocol would give wrong angles without any sign of it. In standing the
+long axis of a segment is about vertical; in a squat thigh and shank rotate about the axis to the right, the
+shank forward and the thigh backward.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sagittal.core.calibration.standing import GOOD_S, LONGEST_S, find_rests, st
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import CalibrationError, SignalError
 from sagittal.core.frames import SHANK, SIDES, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.signals.calibrated import CalibratedRecording, Calibration, SegmentCalibration
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import RestParams, index_window
@@ -51,27 +52,31 @@ def calibrate_with_mounts(
     params: RestParams | None = None,
     after_s: float = 0.0,
 ) -> CalibratedRecording:
-    """Take mountings as they are, and biases, norms and the zero of angles from the first standing.
+    """Use known alignments, and take biases, gravity norms and the zero of angles from the first standing.
 
-    The first rest of 2 s or more, else the longest; of it the last 8 s. Movement follows it.
+    The first rest of 2 s or more, else the longest; of it the last 8 s, before movement starts.
 
     Parameters
     ----------
-    mounts : segment → (3, 3) R_segment_sensor. method : where they come from: "fixed_offset", "table_top".
-    score : how certain they are, as `SegmentCalibration.score`: `FIXED_OFFSET`, `TABLE_TOP`.
-    after_s : rests before this are not of the person.
+    mounts : segment → (3, 3) R_segment_sensor. method : their origin: "fixed_offset", "table_top".
+    score : their certainty, as `SegmentCalibration.score`: `FIXED_OFFSET`, `TABLE_TOP`.
+    after_s : earlier rests are ignored, because the sensors are not yet on the body.
 
     Raises
     ------
-    CalibrationError `no_segment` where no sensor of the take has a mounting, `mounting_not_as_agreed`.
-    SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
+    CalibrationError `no_segment` if no sensor of the recording has a known alignment,
+    `mounting_not_as_agreed`. SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
     """
     params = params or RestParams()
     worn = [s for s in mounts if s in recording.sensors]
     if not worn:
         raise CalibrationError(
             "no_segment",
-            f"Mountings are known of {', '.join(mounts)}; the take has {', '.join(recording.sensors)}.",
+            Message(
+                "Mountings are known of {mounts}; the take has {sensors}.",
+                mounts=", ".join(mounts),
+                sensors=", ".join(recording.sensors),
+            ),
         )
     found = find_rests(recording, params)
     rests = tuple((max(r[0], after_s), r[1]) for r in found if r[1] - params.shortest_s >= after_s)
@@ -103,7 +108,7 @@ def calibrate_with_mounts(
 
 
 def _check_mounts(calibrated: CalibratedRecording) -> None:
-    """Refuse a mounting that standing or the movement contradicts; a lifted leg moves as it likes."""
+    """Reject an alignment that standing or movement contradicts; a lifted leg is not checked."""
     recording, zero = calibrated.recording, calibrated.calibration.zero
     stands = find_standing_legs(calibrated)
     standing = index_window(zero, recording.rate_hz)
@@ -112,7 +117,10 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         up = R @ signals.acc[standing][signals.valid[standing]].mean(axis=0)
         lean = acos(float(np.clip(up[1] / np.linalg.norm(up), -1.0, 1.0)))
         if lean > OFF:
-            raise _refuse(segment, f"in standing its long axis is {degrees(lean):.0f}° off the vertical")
+            raise _refuse(
+                segment,
+                Message("in standing its long axis is {lean:.0f}° off the vertical", lean=degrees(lean)),
+            )
         if segment not in FORWARD:
             continue
         side = SIDE_OF[segment]
@@ -124,7 +132,10 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         axis = np.linalg.eigh(rate.T @ rate)[1][:, -1]
         turned = acos(float(min(1.0, abs(axis[2]))))
         if turned > OFF:
-            raise _refuse(segment, f"it bends about an axis {degrees(turned):.0f}° off the agreed one")
+            raise _refuse(
+                segment,
+                Message("it bends about an axis {turned:.0f}° off the agreed one", turned=degrees(turned)),
+            )
         low, high = np.percentile(FORWARD[segment] * np.arctan2(force[:, 0], force[:, 1]), (2.0, 98.0))
         stood = FORWARD[segment] * float(np.arctan2(up[0], up[1]))
         if stood - low > high - stood and stood - low > LEANS:
@@ -134,7 +145,11 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
 def _refuse(segment: Segment, what: str) -> CalibrationError:
     return CalibrationError(
         "mounting_not_as_agreed",
-        f"{segment}: {what}; limit {degrees(OFF):.0f}°. Put the sensor on as agreed, or calibrate from the "
-        "table.",
+        Message(
+            "{segment}: {what}; limit {OFF:.0f}°. Put the sensor on as agreed, or calibrate from the table.",
+            segment=segment,
+            what=what,
+            OFF=degrees(OFF),
+        ),
         sensor=segment,
     )

@@ -1,4 +1,4 @@
-"""The samples of one attempt to calibrate: of standing the last seconds, of walking all."""
+"""Samples of one calibration attempt: the last seconds of standing, all of walking."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from sagittal.core.timeline.live import UniformBlock
 
 @dataclass(frozen=True)
 class WornSensors:
-    """Who wears which sensors: what of a recording is known before its first sample.
+    """Sensors and subject of a recording, known before its first sample.
 
     Parameters
     ----------
-    segments : in the order of the blocks' columns. mounting : segment → declared mounting, free text.
+    segments : in the order of the blocks' columns. mounting : segment → declared placement, free text.
     """
 
     segments: tuple[Segment, ...]
@@ -29,7 +29,7 @@ class WornSensors:
 
 
 class CalibrationSamples:
-    """Samples of the axis from `first` on, the oldest of which can be dropped."""
+    """Samples of the time axis from `first` on; the oldest can be dropped."""
 
     def __init__(self, wearer: WornSensors, first: int) -> None:
         n = len(wearer.segments)
@@ -41,7 +41,7 @@ class CalibrationSamples:
         return self.past - self.first
 
     def append(self, block: UniformBlock, start: int, stop: int) -> None:
-        """Take rows of a block, which must follow the last ones."""
+        """Append the rows of a block, which must be contiguous with the previous ones."""
         self._acc.append(block.acc[start:stop])
         self._gyr.append(block.gyr[start:stop])
         self._valid.append(block.valid[start:stop])
@@ -57,12 +57,12 @@ class CalibrationSamples:
             self.first = self.past - n
 
     def valid(self, last: int) -> Bools:
-        """Validity (m, k) of the last samples, at most `last`."""
+        """Validity (m, k) of at most the `last` samples."""
         self._join()
         return self._valid[0][-last:]
 
     def recording(self, segments: Sequence[Segment]) -> UniformRecording:
-        """The samples of some segments as a recording of its own, t_s from 0."""
+        """The samples of some segments as a separate recording, t_s from 0."""
         self._join()
         w = self.wearer
         return UniformRecording(

@@ -1,4 +1,4 @@
-"""Standing as it is seen from now: who is still, for how long, and which way is up in each sensor."""
+"""Current standing: which segments are still, for how long, and the vertical in each sensor."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagittal.core.signals.rest import RestParams, find_windows, measure_quietne
 
 @dataclass(frozen=True)
 class StandingNow:
-    """Segments that are still now, how long all have been by now, and the longest rest of all."""
+    """Segments that are currently still, how long all have been still, and the longest rest so far."""
 
     still: frozenset[Segment]
     stood_s: float
@@ -21,7 +21,7 @@ class StandingNow:
 
 
 def judge_standing(recording: UniformRecording, rest: RestParams) -> StandingNow:
-    """By the rules of core/signals/rest.py; the last second decides on now."""
+    """Judge by the rules of core/signals/rest.py; the last second determines the current state."""
     rate, n = recording.rate_hz, len(recording.t_s)
     quiet = {s: measure_quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
     if not quiet or not n:
@@ -48,6 +48,6 @@ def cut_last_part(recording: UniformRecording, seconds: float) -> UniformRecordi
 
 
 def find_upward_axes(recording: UniformRecording) -> dict[Segment, Floats]:
-    """Unit vector (3,) of the vertical in the axes of each sensor, over the last second."""
+    """Unit vector (3,) of the vertical in sensor axes for each sensor, over the last second."""
     mean = {s: x.acc[-round(recording.rate_hz) :].mean(axis=0) for s, x in recording.sensors.items()}
     return {s: x / max(float(np.linalg.norm(x)), 1e-9) for s, x in mean.items()}

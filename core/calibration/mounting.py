@@ -1,7 +1,7 @@
-"""What somebody wrote about how a sensor is worn, as a direction.
+"""Parsing of a free-text sensor placement into a direction.
 
 The manifest's `mounting` is free text per segment, e.g. "sacrum, face backwards". The face is the sensor's
-outer side, its +z axis on all devices we read; "x forward" and the like name another axis.
+outer side, its +z axis on all supported devices; "x forward" and the like name another axis.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ _PHRASE = re.compile(
 
 
 def read_declared_direction(text: str) -> tuple[Floats, float] | None:
-    """Sensor axis (3,) and the angle from anterior in rad it points to, or None if the text does not say.
+    """Sensor axis (3,) and the angle from anterior in rad it points to, or None if the text does not specify
+    one.
 
     >>> declared_direction("sacrum, face backwards")[1]
     3.141592653589793
@@ -43,7 +44,7 @@ def read_declared_direction(text: str) -> tuple[Floats, float] | None:
 
 
 def say_other_way(text: str, way: Way) -> str:
-    """The same words with the way that they name replaced.
+    """The same text with the named direction replaced.
 
     >>> say_other_way("sacrum, face backwards", "forward")
     'sacrum, face forward'
@@ -53,15 +54,15 @@ def say_other_way(text: str, way: Way) -> str:
 
 
 def read_declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:
-    """Angle in rad of the anterior axis in the sensor's rest world, from a declared mounting.
+    """Angle in rad of the anterior axis in the sensor's rest frame, from a declared placement.
 
     Parameters
     ----------
-    R_vertical : (3, 3) rows of the vertical frame; its x is the rest world's x, its z the rest world's −y.
+    R_vertical : (3, 3) rows of the vertical frame; its x is the rest frame's x, its z the rest frame's −y.
 
     Returns
     -------
-    None when the text says nothing, or names an axis that stands within 30° of vertical.
+    None if the text specifies no direction, or an axis within 30° of vertical.
     """
     declared = read_declared_direction(text)
     if declared is None:

@@ -1,6 +1,6 @@
-"""How good a calibration is: checks of every sensor, each with its limit, what it means and what to do.
+"""Calibration quality: checks of every sensor, each with its limit, interpretation and remedy.
 
-The rules stand in one table (score_rules.py); limits are `ScoreParams`. Where the limits come from:
+The rules are in one table (score_rules.py); limits are `ScoreParams`. Sources of the limits:
 docs/science/calibration.md, "Score".
 """
 
@@ -21,6 +21,7 @@ from sagittal.core.calibration.knee_axis import KNEE_SEEN, STEEPEST, measure_kne
 from sagittal.core.calibration.score_rules import RULE_OF, CheckName, CheckRule
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.frames import FOOT, GRAVITY, SEGMENTS, SHANK, SIDES, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import wrap_angle
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window, measure_turn
@@ -45,10 +46,11 @@ class ScoreParams:
 
     Parameters
     ----------
-    stillness : turn of the vertical while standing, degrees. gravity : |f| at rest off gravity, percent.
-    axis_share : share of the first component of the rate. repetitions : straight steps; of swings and bows
-    those that `FunctionalParams` asks for. mirror, knee_axis, heading_spread : degrees.
-    joint_misfit : of a joint's acceleration from its two sides, over its size.
+    stillness : rotation of the vertical while standing, degrees. gravity : deviation of |f| at rest from
+    gravity, percent.
+    axis_share : share of the first component of the rate. repetitions : straight steps; for swings and bows
+    those required by `FunctionalParams`. mirror, knee_axis, heading_spread : degrees.
+    joint_misfit : difference of the joint acceleration seen from its two sides, relative to its magnitude.
     """
 
     stillness: float = 4.0
@@ -63,12 +65,12 @@ class ScoreParams:
 
 @dataclass(frozen=True)
 class CalibrationCheck:
-    """One check of one sensor, or of the whole take.
+    """One check of one sensor, or of the whole recording.
 
     Parameters
     ----------
-    segment : None = the whole take. value : in the unit of its rule, None where it could not be measured.
-    limit : None where there is none. why : what the verdict means; empty where it passes.
+    segment : None = the whole recording. value : in the unit of its rule, None if it could not be measured.
+    limit : None if there is none. why : interpretation of the verdict; empty if passed.
     """
 
     name: CheckName
@@ -80,16 +82,16 @@ class CalibrationCheck:
 
     @property
     def rule(self) -> CheckRule:
-        """Its words."""
+        """Rule of this check, with its texts."""
         return RULE_OF[self.name]
 
     @property
     def todo(self) -> str:
-        """What to do; empty unless something is to be done again."""
+        """Remedy; empty unless something has to be repeated."""
         return self.rule.todo if self.verdict == "redo" else ""
 
     def to_json(self) -> dict[str, object]:
-        """The check with its words, as JSON values."""
+        """The check with its texts, as JSON values."""
         rule = self.rule
         return {
             "name": self.name,
@@ -113,7 +115,7 @@ class CalibrationScore:
 
     @property
     def verdict(self) -> CalibrationVerdict:
-        """Of the whole take."""
+        """Verdict of the whole recording."""
         return judge_together(self.checks)
 
     def judge_segment(self, segment: Segment) -> CalibrationVerdict:
@@ -121,7 +123,7 @@ class CalibrationScore:
         return judge_together(c for c in self.checks if c.segment == segment)
 
     def to_json(self) -> dict[str, object]:
-        """Verdicts of the take and of its sensors, and every check, as JSON values."""
+        """Verdicts of the recording and its sensors, and every check, as JSON values."""
         worn = [s for s in SEGMENTS if any(c.segment == s for c in self.checks)]
         return {
             "verdict": self.verdict,
@@ -131,7 +133,9 @@ class CalibrationScore:
 
 
 def judge_together(checks: Iterable[CalibrationCheck]) -> CalibrationVerdict:
-    """Redo where one check says so, pass where one passes and none says so."""
+    """Combined verdict: "redo" if any check requires it, "pass" if any check passed and none requires a
+    redo.
+    """
     found = {c.verdict for c in checks}
     return "redo" if "redo" in found else "pass" if "pass" in found else "not_judged"
 
@@ -142,12 +146,12 @@ def score_calibration(
     agreed: Agreement | None = None,
     turned: Mapping[Segment, float] | None = None,
 ) -> CalibrationScore:
-    """Judge a calibration by every check that its take allows.
+    """Score a calibration by all checks applicable to its recording.
 
     Parameters
     ----------
-    calibrated : with the mountings that are used. agreed : what the sensors say of each other, None where
-    nobody compared them. turned : segment → how far the joints turned its forward axis, rad.
+    calibrated : with the alignments in use. agreed : result of comparing the sensors with each other, None if
+    not compared. turned : segment → correction of its forward axis by the joint estimation, rad.
     """
     view = _Evidence(calibrated, params or ScoreParams(), agreed, turned or {})
     moved = {s for s, x in calibrated.calibration.segments.items() if x.method in FUNCTIONAL}
@@ -172,7 +176,7 @@ def score_calibration(
 
 
 class _Evidence:
-    """What the checks are made of, worked out once."""
+    """Data for the checks, computed once."""
 
     def __init__(
         self,
@@ -196,12 +200,12 @@ class _Evidence:
         self.axes = {s: self._find_axis(s) for s in self.rates}
 
     def _seen(self, *segments: Segment) -> Bools:
-        """Samples (n,) of straight walking at which all of these sensors were there."""
+        """Samples (n,) of straight walking with all of these sensors available."""
         valid = [self.recording.sensors[s].valid for s in segments]
         return np.asarray(np.logical_and.reduce([self.straight, *valid]))
 
     def _find_axis(self, segment: Segment) -> tuple[float, float] | None:
-        """Heading of the axis it turns about from the medio-lateral one, rad, and the share of it."""
+        """Deviation of the rotation axis from the medio-lateral axis, rad, and the share of that axis."""
         seen = self._seen(segment)
         if segment in TRUNK or np.count_nonzero(seen) < TURNED_ALL * self.recording.rate_hz:
             return None
@@ -228,7 +232,7 @@ class _Evidence:
         return CalibrationCheck("forward_found", segment, None, None, "redo", why)
 
     def check_repetitions(self, segment: Segment) -> CalibrationCheck:
-        """Swings or bows that were done for this sensor."""
+        """Number of swings or bows available for this sensor."""
         facts = self._facts(segment)
         done, asked = float(facts["repetitions"]), float(facts["asked"])
         why = "" if done >= asked else RULE_OF["repetitions"].means
@@ -236,7 +240,7 @@ class _Evidence:
         return CalibrationCheck("repetitions", segment, done, asked, verdict, why)
 
     def _facts(self, segment: Segment) -> Mapping[str, Any]:
-        """What its calibration says of how the forward axis was found."""
+        """Diagnostics on how the forward axis was determined."""
         facts = self.calibration.diagnostics.get(segment)
         return facts if isinstance(facts, Mapping) else {}
 
@@ -289,7 +293,11 @@ class _Evidence:
         found = self.knees.get(side)
         if found is None:
             return self._leave(
-                "knee_axis", segment, f"Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking."
+                "knee_axis",
+                segment,
+                Message(
+                    "Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking.", KNEE_SEEN=KNEE_SEEN
+                ),
             )
         apart = degrees(abs(float(wrap_angle(found.apart))))
         if found.steepest > STEEPEST:
@@ -297,7 +305,9 @@ class _Evidence:
         return self._judge("knee_axis", segment, apart)
 
     def check_joints(self, segment: Segment) -> CalibrationCheck:
-        """The best of its joints: a sensor whose neighbour alone is wrong fits its other neighbour."""
+        """Best misfit of its joints: a sensor next to a single wrong sensor still fits its other
+        neighbour.
+        """
         misfits = {} if self.agreed is None else self.agreed.misfits
         own = [x for joint, x in misfits.items() if segment in joint]
         if not own:
@@ -305,7 +315,9 @@ class _Evidence:
         return self._judge("joint_misfit", segment, min(own))
 
     def check_heading_spread(self, segment: Segment) -> CalibrationCheck:
-        """The axis that is used against every measure of forward that is believed, and the calibration's."""
+        """Largest deviation of the axis in use from the accepted measures of forward and from the initial
+        calibration.
+        """
         said = self._facts(segment)
         back = float(self.turned.get(segment, 0.0))
         measures = [back] if segment in self.turned else []

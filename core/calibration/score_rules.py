@@ -1,4 +1,4 @@
-"""The checks of a calibration in words: titles, what a value beyond its limit means, and what to do then."""
+"""Texts of the calibration checks: titles, interpretation of a failed check, and remedy."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ CheckName = Literal[
 
 @dataclass(frozen=True)
 class CheckRule:
-    """One check as people read it.
+    """One check as presented to users.
 
     Parameters
     ----------
-    least : the value must reach the limit; else it must not exceed it. means : what a value beyond the limit
-    says. todo : what to do then.
+    least : the value must reach the limit; otherwise it must not exceed it. means : interpretation of a
+    failed check. todo : remedy.
     """
 
     name: CheckName

@@ -1,9 +1,10 @@
-"""One sensor of somebody who never stands still: gyroscope bias, attitude and mean posture from the walk.
+"""Gyroscope bias, attitude and mean posture of a sensor from walking, without quiet standing.
 
-Two things hold in every walk. Between two moments at which a foot is flat its velocity begins and ends at
-zero, so its mean specific force in a fixed frame is gravity; of any other segment that is true on average
-over some strides straight ahead. And who walks straight faces the same way at both ends. A gyroscope with a
-bias turns both away: the bias is what keeps them (docs/science/calibration.md, "Without standing").
+Two constraints hold in every walk. Between two foot-flat moments the velocity begins and ends at zero, so the
+mean specific force in a fixed frame is gravity; for other segments that is true on average over several
+strides straight ahead. And in straight walking the heading is the same at both ends. A gyroscope bias
+violates both; it is estimated as the value that satisfies them (docs/science/calibration.md, "Without
+standing").
 """
 
 from __future__ import annotations
@@ -33,21 +34,22 @@ PROBE = 1e-4
 
 @dataclass(frozen=True)
 class WalkRungParams:
-    """How sensors are calibrated from walking alone (docs/science/calibration.md, "Without standing").
+    """Calibration of sensors from walking alone (docs/science/calibration.md, "Without standing").
 
     Parameters
     ----------
-    least_s : shortest walking it is tried on: some three strides (our choice).
-    flat_apart_s : least time between two flat moments of a foot. flat_mean_s : time over which its rate is
-        averaged to find them.
-    flat_times, flat_rate : a quiet moment counts when its rate is below the lower quartile times the one plus
-        the other (rad/s): flats of ipol_walks have 4 to 30 °/s, the quietest moment of a swing 60 and more.
-    window_s : length of the Hann window over which specific force is averaged where no foot rests: a stride
-        of 1.5 s and all of its harmonics are damped by 30 dB or more.
-    foot_sd, body_sd : what a mean specific force is off gravity between two flats and in such a window, m/s²
-        (measured on ipol_walks, neura_walk and qmt_fullbody: .03 to .6 and .4 to .9).
-    bias_sd : of a gyroscope that nobody saw at rest, rad/s (the sensors of those sets have 0.1 to 2 °/s).
-    heading_sd : of the heading of one straight part's ends, rad (our choice: a step's).
+    least_s : shortest walk used: about three strides (our choice).
+    flat_apart_s : minimum time between two foot-flat moments. flat_mean_s : averaging time of the rate to
+    detect them.
+    flat_times, flat_rate : a foot-flat moment has a rate below the lower quartile times `flat_times` plus
+    `flat_rate` (rad/s): foot-flat moments in ipol_walks have 4 to 30 °/s, the quietest moment of a swing 60
+    and more.
+    window_s : length of the Hann window for averaging specific force without foot-flat moments: strides of up
+    to 1.5 s and all of their harmonics are attenuated by 30 dB or more.
+    foot_sd, body_sd : deviation of the mean specific force from gravity between two foot-flat moments and in
+    such a window, m/s² (measured on ipol_walks, neura_walk and qmt_fullbody: .03 to .6 and .4 to .9).
+    bias_sd : of a gyroscope never observed at rest, rad/s (the sensors of those data sets have 0.1 to 2 °/s).
+    heading_sd : of the heading at the ends of a straight part, rad (our choice: that of a step).
     """
 
     least_s: float = 4.0
@@ -64,12 +66,12 @@ class WalkRungParams:
 
 @dataclass(frozen=True, eq=False)
 class SensorInWalk:
-    """One sensor while somebody walks.
+    """One sensor during walking.
 
     Parameters
     ----------
-    q : (n, 4) sensor to a z-up world of its own. gyro_bias : (3,) rad/s. norm : mean |f|, m/s².
-    flats : (m,) samples at which a foot is flat; empty for other segments.
+    q : (n, 4) sensor to its own z-up world frame. gyro_bias : (3,) rad/s. norm : mean |f|, m/s².
+    flats : (m,) foot-flat samples; empty for other segments.
     """
 
     q: Floats
@@ -79,11 +81,11 @@ class SensorInWalk:
 
 
 def find_flat_moments(gyr: Floats, walked: Bools, rate_hz: float, params: WalkRungParams) -> Indices:
-    """Samples (m,) at which a foot that walks is at its quietest, one or more in every stance.
+    """Samples (m,) of foot-flat: minima of the foot's rate, at least one per stance.
 
     Parameters
     ----------
-    gyr : (n, 3) rad/s. walked : (n,) somebody walks and the sensor is there.
+    gyr : (n, 3) rad/s. walked : (n,) walking with the sensor available.
     """
     from scipy.ndimage import uniform_filter1d
 
@@ -111,11 +113,11 @@ def follow_sensor(
 
     Parameters
     ----------
-    walks : index ranges in which somebody walks. straight : (n,) and does not turn, as far as is known.
+    walks : index ranges of walking. straight : (n,) walking without turning, as far as known.
 
     Returns
     -------
-    None where the sensor is there for no walk of `least_s`.
+    None if the sensor is available in no walk of at least `least_s`.
     """
     walked = np.zeros(len(signals.acc), np.bool_)
     for a, b in walks:
@@ -145,12 +147,12 @@ def follow_sensor(
 
 @dataclass(frozen=True, eq=False)
 class _Stretch:
-    """One unbroken walk of a sensor, integrated from its rates alone.
+    """One uninterrupted walk of a sensor, integrated from its rates alone.
 
     Parameters
     ----------
     first : its first sample. q : (m, 4) sensor to the frame of its first sample. forces : (k, 3) mean
-    specific force in that frame over spans that should show gravity alone. inverse_sd : 1 / (m/s²) of each.
+    specific force in that frame over spans in which it should equal gravity. inverse_sd : 1 / (m/s²) of each.
     """
 
     first: int
@@ -198,10 +200,11 @@ def _bias_step(
     rate_hz: float,
     params: WalkRungParams,
 ) -> Floats:
-    """Change (3,) of the bias that lays the mean forces of each stretch upon each other, and its heading.
+    """Bias correction (3,) that aligns the mean forces within each stretch, and its heading.
 
-    Least squares with the prior `bias_sd`, so that a short walk, which shows little, changes little. About
-    the vertical gravity says nothing: there the bias is the mean turning rate straight ahead.
+    Least squares with the prior `bias_sd`, so that a short, uninformative walk changes little. Gravity
+    carries no information about rotation around the vertical: there the bias is the mean turning rate
+    straight ahead.
     """
     up = np.mean([rotate(conjugate(x.q), _direction(x)).mean(axis=0) for x in stretches], axis=0)
     up /= np.linalg.norm(up)
@@ -228,7 +231,7 @@ def _bias_step(
 
 
 def _heading_drift(stretches: Sequence[_Stretch], straight: Bools, rate_hz: float) -> tuple[Floats, Floats]:
-    """Turn about the vertical (k,) in rad between first and last third of each straight part, and time."""
+    """Heading change (k,) in rad between first and last third of each straight part, and the time between."""
     turned, time = [], []
     for x in stretches:
         # the turn since the first sample as the room sees it: its twist is the same for any mounting
@@ -251,7 +254,7 @@ def _direction(stretch: _Stretch) -> Floats:
 
 
 def _level(force: Floats) -> Floats:
-    """The shortest turn (4,) that lays a force (3,) upon the vertical."""
+    """The shortest rotation (4,) that aligns a force (3,) with the vertical."""
     z = force / np.linalg.norm(force)
     axis = np.cross(z, UP)
     w = 1.0 + float(z @ UP)

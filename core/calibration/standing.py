@@ -1,4 +1,4 @@
-"""Standing: the rest to calibrate on, which way is up in each sensor, what its gyroscope reads at rest."""
+"""Quiet standing: the rest used for calibration, and per sensor the vertical and the gyroscope bias."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import SHANK, THIGH, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from sagittal.core.signals.rest import (
     QuietParams,
@@ -73,7 +74,7 @@ def measure_standing(
 
     Raises
     ------
-    SignalError `unit_suspect` when what is measured at rest cannot be gravity in m/s².
+    SignalError `unit_suspect` if the value at rest cannot be gravity in m/s².
     """
     part = index_window(window, rate_hz)
     ok = signals.valid[part]
@@ -82,8 +83,13 @@ def measure_standing(
     if not NORM_RANGE[0] <= norm <= NORM_RANGE[1]:
         raise SignalError(
             "unit_suspect",
-            f"{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. Near 1 the "
-            "unit is g, near 0 gravity was removed: declare the unit, or export raw accelerations.",
+            Message(
+                "{segment}: the accelerometer reads {norm:.2f} m/s² at rest, expected 9.81 ± 10 %. "
+                "Near 1 the unit is g, near 0 gravity was removed: declare the unit, or export raw "
+                "accelerations.",
+                segment=segment,
+                norm=norm,
+            ),
             sensor=segment,
             t_s=window[0],
         )
@@ -108,11 +114,11 @@ def vertical_frame(up: Floats) -> Floats:
 
 
 def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window, ...]:
-    """All windows in which every sensor is at rest, without those in which one of them moves slowly.
+    """All windows with every sensor at rest, excluding those with slow movement of one of them.
 
     Raises
     ------
-    SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment that was found.
+    SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment found.
     """
     found = find_rest_windows(recording, params)
     if rests := drop_false_rests(recording, found, params):
@@ -120,9 +126,11 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
     if found:
         raise SignalError(
             "not_still",
-            "No standing found: in the quietest seconds a sensor still turns by more than "
-            f"{np.degrees(params.drift):.0f}°. Let the person stand still for 3 to 5 s before or after "
-            "walking.",
+            Message(
+                "No standing found: in the quietest seconds a sensor still turns by more than {drift:.0f}°. "
+                "Let the person stand still for 3 to 5 s before or after walking.",
+                drift=np.degrees(params.drift),
+            ),
             t_s=found[0][0],
         )
     quietest: list[tuple[float, Segment, float]] = []
@@ -139,22 +147,35 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         code, what = "no_rest", "every sensor is still at some time, but never all of them together"
     elif rate < WOBBLE_FACTOR * params.gyro_limit:
         code = "not_still"
-        what = f"{segment} moves at {np.degrees(rate):.1f} °/s in its quietest second, limit {limit:.0f} °/s"
+        what = Message(
+            "{segment} moves at {rate:.1f} °/s in its quietest second, limit {limit:.0f} °/s",
+            segment=segment,
+            rate=np.degrees(rate),
+            limit=limit,
+        )
     else:
         code = "no_rest"
-        what = f"the quietest second of {segment} has {np.degrees(rate):.0f} °/s, limit {limit:.0f} °/s"
+        what = Message(
+            "the quietest second of {segment} has {rate:.0f} °/s, limit {limit:.0f} °/s",
+            segment=segment,
+            rate=np.degrees(rate),
+            limit=limit,
+        )
     raise SignalError(
         code,
-        f"No standing found: {what}. Let the person stand still for 3 to 5 s before or after walking.",
+        Message(
+            "No standing found: {what}. Let the person stand still for 3 to 5 s before or after walking.",
+            what=what,
+        ),
         sensor=segment if np.isfinite(rate) else None,
         t_s=at_s,
     )
 
 
 def drop_pauses(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> tuple[Window, ...]:
-    """The rests that can be a standing: not those shorter than 2 s with movement right before and after.
+    """The rests suitable as standing: drops those shorter than 2 s with movement right before and after.
 
-    Who pauses in a walk has one foot ahead of the other.
+    In a pause while walking, one foot is ahead of the other.
 
     Parameters
     ----------
@@ -171,20 +192,21 @@ def drop_pauses(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> tup
 
 
 def measure_leg_ahead(tilt: Mapping[Segment, float]) -> float:
-    """By how much one leg was ahead of the other while the person stood, rad; 0 where no legs show it.
+    """How far one leg was ahead of the other while standing, rad; 0 if no leg sensors show it.
 
-    Standing with the feet side by side both legs are as far from their mean posture in walking. In a step
-    position thigh and shank of one leg are both tilted forward against the other's; a knee that does not
-    extend, a turned axis or a slipped sensor tilts one of them, or both in opposite ways.
+    When standing with the feet side by side both legs deviate equally from their mean posture in walking. In
+    a step position thigh and shank of one leg are both tilted forward relative to the other's; a knee that
+    does not extend, a rotated axis or a slipped sensor tilts only one of them, or both in opposite
+    directions.
 
     Parameters
     ----------
-    tilt : segment → mean sagittal inclination in straight walking against the standing, rad.
+    tilt : segment → mean sagittal inclination in straight walking relative to standing, rad.
 
     Returns
     -------
-    The smaller of the differences of the thighs and of the shanks where they have one sign, else 0. With one
-    of the two pairs half of its difference.
+    The smaller of the differences between the thighs and between the shanks if they have the same sign, else
+    0. With only one of the two pairs half of its difference.
     """
     apart = [
         tilt[pair["left"]] - tilt[pair["right"]]
@@ -199,9 +221,10 @@ def measure_leg_ahead(tilt: Mapping[Segment, float]) -> float:
 
 
 def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Window:
-    """The rest to calibrate on: the last good one before the first long walk, else the first good one after.
+    """The rest to calibrate on: the last good one before the first long walk, else the first good one after
+    it.
 
-    A long walk, not the first movement: a take may begin with sensors that lie on a table and are put on.
+    A long walk, not the first movement: a recording may begin with sensors on a table before they are put on.
 
     Parameters
     ----------
@@ -209,7 +232,7 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
 
     Returns
     -------
-    At most 8 s of the chosen rest, at the side of the walk.
+    At most 8 s of the chosen rest, at the end next to the walk.
     """
     walks = [(a / rate_hz, b / rate_hz) for a, b in find_runs(moving)]
     long = min(LONG_WALK_S, 0.5 * max((b - a for a, b in walks), default=0.0))
@@ -229,9 +252,10 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
 def stand_all(
     recording: UniformRecording, window: Window, rests: tuple[Window, ...], params: RestParams
 ) -> Mapping[Segment, SensorAtRest]:
-    """Standing of every sensor over one window, its gyroscope's bias held against the longest rest.
+    """Standing data of every sensor over one window, with the gyroscope bias checked against the longest
+    rest.
 
-    A sensor that turned slowly while the person stood has a mean rate that is no bias.
+    The mean rate of a sensor that rotated slowly while the person stood is not its bias.
     """
     rate = recording.rate_hz
     longest = max(rests, key=lambda r: r[1] - r[0])

@@ -1,7 +1,7 @@
-"""Which leg carries a person whose legs both carry sensors: the lower ankle stands on the floor.
+"""Detection of the supporting leg with sensors on both legs: the lower ankle is on the floor.
 
-Only inclinations to gravity go in, so that neither a heading nor a turn of a sensor about the long axis of
-its segment matters (docs/science/squat.md, "Two legs").
+Only inclinations relative to gravity are used, so neither heading nor a rotation of a sensor about the long
+axis of its segment matters (docs/science/squat.md, "Two legs").
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ HIPS: Final = 0.1
 
 
 def find_standing_legs(calibrated: CalibratedRecording) -> dict[Side, Bools]:
-    """Side → (n,) True where the foot of that leg is taken to be on the floor.
+    """Side → (n,) True where the foot of that leg is assumed to be on the floor.
 
     Parameters
     ----------
-    calibrated : with its standing, in which both feet are on the floor.
+    calibrated : with a standing window in which both feet are on the floor.
 
     Returns
     -------
-    Legs with sensors on shank and thigh; all True where only one has them, or the pelvis has none.
+    Legs with sensors on shank and thigh; all True if only one has them, or the pelvis has none.
     """
     mounted = calibrated.calibration.segments
     legs = [side for side in SIDES if SHANK[side] in mounted and THIGH[side] in mounted]
@@ -57,7 +57,7 @@ def find_standing_legs(calibrated: CalibratedRecording) -> dict[Side, Bools]:
 
 
 def _measure_up(calibrated: CalibratedRecording, segment: Segment, axis: int) -> Floats:
-    """Vertical part (n,) of a segment's axis as smoothed gravity shows it; bridged where it is silent."""
+    """Vertical component (n,) of a segment axis from smoothed gravity; interpolated across data loss."""
     from scipy.ndimage import uniform_filter1d
 
     recording = calibrated.recording

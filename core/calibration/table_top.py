@@ -1,4 +1,4 @@
-"""Table-top calibration: sensors lie on a table as agreed and are carried to the body.
+"""Table-top calibration: sensors start on a table in a specified orientation and are carried to the body.
 
 Kianifar et al.: the gyroscope is integrated from the table to the leg. The person stands still and faces
 along the arrow on the table (docs/science/squat.md, "From the table").
@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import CalibrationError, Notice
 from sagittal.core.frames import R_NEUTRAL, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, exp, from_matrix, mean, multiply, rotate, to_matrix
 from sagittal.core.rotation.compiled import turn
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
@@ -23,19 +24,20 @@ from sagittal.core.signals.rest import QuietParams, Window, find_rest_windows, f
 
 @dataclass(frozen=True)
 class TableTopParams:
-    """What the protocol asks for (docs/science/squat.md, "From the table").
+    """Protocol requirements (docs/science/squat.md, "From the table").
 
     Parameters
     ----------
-    longest_s : between the two rests. edge_s : a rest may begin so late and end so early in the take.
-    still_s, still : the quietest part of the rest on the table, and the most that its rate may vary, SD in
-        rad/s: what a hand holds varies more.
-    mean_s : of the rest on the body. slope : device against the table it should lie flat on, rad.
-    drift : tilt at the end that gravity takes off and that is told of, rad.
-    facing : of the person from the arrow, left positive, rad.
+    longest_s : longest time between the two rests. edge_s : tolerance for the first rest to begin after the
+    start and the last to end before the end of the recording.
+    still_s, still : length of the quietest part of the rest on the table, and the maximum SD of its rate in
+    rad/s: a hand-held sensor varies more.
+    mean_s : averaging time of the rest on the body. slope : maximum tilt of the device on the table, rad.
+    drift : tilt error at the end, corrected by gravity, above which a notice is given, rad.
+    facing : of the person relative to the arrow, left positive, rad.
     table : (w, x, y, z) device on the table in arrow axes: x along the arrow, z up.
-    stand_s : shortest standing with all sensors on. worn : a sensor whose vertical has turned so far from
-        that on the table is on the body, rad.
+    stand_s : shortest standing with all sensors attached. worn : a sensor whose vertical has rotated by more
+    than this since the table counts as attached to the body, rad.
     """
 
     rest: QuietParams = field(default_factory=QuietParams)
@@ -54,12 +56,13 @@ class TableTopParams:
 
 @dataclass(frozen=True, eq=False)
 class TableTopMounts:
-    """How the sensors sit.
+    """Sensor-to-segment alignment from the table-top protocol.
 
     Parameters
     ----------
     R_segment_sensor : segment → (3, 3). gyro_bias : segment → (3,) rad/s, on the table.
-    drift_rad : segment → tilt that gravity took off at the end. moved_s : segment → time between the rests.
+    drift_rad : segment → tilt error corrected by gravity at the end. moved_s : segment → time between the
+    rests.
     """
 
     R_segment_sensor: Mapping[Segment, Floats]
@@ -70,7 +73,7 @@ class TableTopMounts:
 
 
 def calibrate_table_top(recording: UniformRecording, params: TableTopParams | None = None) -> TableTopMounts:
-    """Find how every sensor of a take sits, from its way from the table to a person who stands neutral.
+    """Estimate the alignment of every sensor, tracking it from the table to a person in neutral standing.
 
     Raises
     ------
@@ -80,7 +83,7 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
     References
     ----------
     Kianifar et al. 2019, "Calibration protocol", equations 2 to 5, doi:10.1177/2055668318813455. There the
-    increment is written as the matrix itself; tilts are not corrected and no rest is asked for.
+    increment is written as the matrix itself; tilts are not corrected and no rest is required.
     """
     params = params or TableTopParams()
     if not recording.sensors:
@@ -99,18 +102,20 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
         q, drifts[segment] = _carry(signals, biases[segment], start, part, body, recording.rate_hz, params)
         mounts[segment], moved[segment] = to_matrix(multiply(to_segment, q)), body[0] - table[1]
         if drifts[segment] > params.drift:
-            message = (
-                f"{segment}: its tilt drifted by {degrees(drifts[segment]):.1f}° on the way from the table; "
-                "its heading may be off as much. Put it on again, faster."
+            message = Message(
+                "{segment}: its tilt drifted by {degrees:.1f}° on the way from the table; its "
+                "heading may be off as much. Put it on again, faster.",
+                segment=segment,
+                degrees=degrees(drifts[segment]),
             )
             notices.append(Notice("table_top_drift", message, sensor=segment))
     return TableTopMounts(mounts, biases, drifts, moved, tuple(notices))
 
 
 def find_worn_standing(recording: UniformRecording, params: TableTopParams | None = None) -> Window:
-    """The first standing in which every sensor has left the table, of a take that goes on after it.
+    """First standing with every sensor off the table, in a recording that continues after it.
 
-    While one sensor is put on the others lie still, so rest alone does not tell.
+    While one sensor is being attached the others are still, so stillness alone is not sufficient.
 
     Raises
     ------
@@ -131,14 +136,17 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
             return rest
     raise CalibrationError(
         "body_not_still",
-        f"No standing of {params.stand_s:g} s was found with all sensors on the body; stand still before "
-        "squatting.",
+        Message(
+            "No standing of {stand_s:g} s was found with all sensors on the body; stand still "
+            "before squatting.",
+            stand_s=params.stand_s,
+        ),
         t_s=rests[0][1],
     )
 
 
 def crop(recording: UniformRecording, end_s: float) -> UniformRecording:
-    """The take up to a time."""
+    """The recording up to a time."""
     part = slice(0, index_window((0.0, end_s), recording.rate_hz).stop)
     sensors = {
         s: SensorSignals(
@@ -163,22 +171,30 @@ def _turned(signals: SensorSignals, rate_hz: float, a: Window, b: Window) -> flo
 def _find_ends(
     recording: UniformRecording, segment: Segment, params: TableTopParams
 ) -> tuple[Window, Window]:
-    """The rests of a sensor on the table and on the body."""
+    """The rest periods of a sensor on the table and on the body."""
     end_s = len(recording.t_s) / recording.rate_hz
     rests = find_rest_windows(recording, params.rest, (segment,))
     if not rests or rests[0][0] > params.edge_s:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} does not lie still when the take begins; leave it on the table for "
-            f"{params.rest.shortest_s:g} s or more after the start.",
+            Message(
+                "{segment} does not lie still when the take begins; leave it on the table for {shortest_s:g} "
+                "s or more after the start.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=0.0,
         )
     if len(rests) < 2 or rests[-1][1] < end_s - params.edge_s:
         raise CalibrationError(
             "body_not_still",
-            f"{segment} is not still on the body when the take ends; stand still for "
-            f"{params.rest.shortest_s:g} s or more before stopping.",
+            Message(
+                "{segment} is not still on the body when the take ends; stand still for {shortest_s:g} "
+                "s or more before stopping.",
+                segment=segment,
+                shortest_s=params.rest.shortest_s,
+            ),
             sensor=segment,
             t_s=end_s,
         )
@@ -186,8 +202,13 @@ def _find_ends(
     if body[0] - table[1] > params.longest_s:
         raise CalibrationError(
             "table_top_too_long",
-            f"{segment} was on its way for {body[0] - table[1]:.0f} s; the gyroscope can be trusted for "
-            f"{params.longest_s:g} s.",
+            Message(
+                "{segment} was on its way for {table:.0f} s; the gyroscope can be trusted for {longest_s:g} "
+                "s.",
+                segment=segment,
+                table=body[0] - table[1],
+                longest_s=params.longest_s,
+            ),
             sensor=segment,
             t_s=table[1],
         )
@@ -195,8 +216,14 @@ def _find_ends(
     if rate > params.still:
         raise CalibrationError(
             "table_not_still",
-            f"{segment} is not still on the table: its rate varies by {degrees(rate):.1f} °/s, limit "
-            f"{degrees(params.still):.0f} °/s. Leave it alone for {params.still_s:g} s after the start.",
+            Message(
+                "{segment} is not still on the table: its rate varies by {rate:.1f} °/s, limit {still:.0f} "
+                "°/s. Leave it alone for {still_s:g} s after the start.",
+                segment=segment,
+                rate=degrees(rate),
+                still=degrees(params.still),
+                still_s=params.still_s,
+            ),
             sensor=segment,
             t_s=table[0],
         )
@@ -204,7 +231,10 @@ def _find_ends(
     if silent:
         raise CalibrationError(
             "table_top_gap",
-            f"{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+            Message(
+                "{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+                segment=segment,
+            ),
             sensor=segment,
             t_s=silent[0][0] / recording.rate_hz,
         )
@@ -214,9 +244,9 @@ def _find_ends(
 def _find_stillest(
     recording: UniformRecording, segment: Segment, rest: Window, params: TableTopParams
 ) -> tuple[Window, float]:
-    """The part of a rest in which the rate varies least, and its standard deviation, rad/s.
+    """The part of a rest with the least variation of the rate, and its standard deviation, rad/s.
 
-    A rest may end with the onset of a slow movement, which is no bias.
+    A rest may end with the onset of a slow movement, which must not enter the bias.
     """
     part, width = index_window(rest, recording.rate_hz), round(params.still_s * recording.rate_hz)
     gyr = recording.sensors[segment].gyr
@@ -228,15 +258,20 @@ def _find_stillest(
 
 
 def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Floats:
-    """Orientation (4,) of a device on the table, in arrow axes; gravity says how level it lies."""
+    """Orientation (4,) of a device on the table, in arrow axes, levelled by gravity."""
     q = np.array(params.table) / np.linalg.norm(params.table)
     level = _turn_upright(rotate(q, force))
     slope = float(2.0 * acos(min(1.0, abs(float(level[0])))))
     if slope > params.slope:
         raise CalibrationError(
             "table_orientation",
-            f"{segment} lies {degrees(slope):.0f}° off the agreed way on the table, limit "
-            f"{degrees(params.slope):.0f}°; lay all sensors the same way up.",
+            Message(
+                "{segment} lies {slope:.0f}° off the agreed way on the table, limit {slope2:.0f}°; "
+                "lay all sensors the same way up.",
+                segment=segment,
+                slope=degrees(slope),
+                slope2=degrees(params.slope),
+            ),
             sensor=segment,
             t_s=0.0,
         )
@@ -252,7 +287,7 @@ def _carry(
     rate_hz: float,
     params: TableTopParams,
 ) -> tuple[Floats, float]:
-    """Orientation (4,) on the body in arrow axes, and the tilt that gravity took off, rad."""
+    """Orientation (4,) on the body in arrow axes, and the tilt error corrected by gravity, rad."""
     gyr = np.ascontiguousarray(signals.gyr[part.stop - 1 :] - bias)
     q = np.empty((len(gyr), 4))
     integrate_turns(gyr, 1.0 / rate_hz, start, q)
@@ -263,7 +298,7 @@ def _carry(
 
 
 def _turn_upright(force: Floats) -> Floats:
-    """The shortest turn (4,) that takes a vector (3,) to the vertical."""
+    """The shortest rotation (4,) that maps a vector (3,) to the vertical."""
     up = force / np.linalg.norm(force)
     axis = np.array([up[1], -up[0], 0.0])
     sine = float(np.linalg.norm(axis))
@@ -277,8 +312,8 @@ def _turn_upright(force: Floats) -> Floats:
 def integrate_turns(gyr, dt, start, out):  # type: ignore[no-untyped-def]
     """Write orientations (n, 4) of a sensor with rates (n, 3), start (4,) at the first sample.
 
-    R ← R Exp(ω Δt) of Kianifar equations 4 and 5 (their increment is the matrix of a body-fixed turn, so it
-    stands on the right); the rate of a step is the mean of both its ends.
+    R ← R Exp(ω Δt) of Kianifar equations 4 and 5 (their increment is the matrix of a body-fixed rotation, so
+    it multiplies from the right); the rate of a step is the mean of the rates at its ends.
     """
     h = 0.5 * dt
     out[0] = start

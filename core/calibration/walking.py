@@ -1,4 +1,4 @@
-"""Where somebody walks, and where straight: the parts of a take that show the direction of walking."""
+"""Walking and straight walking: the parts of a recording that show the direction of walking."""
 
 from __future__ import annotations
 
@@ -30,17 +30,16 @@ OWN_PERCENTILE: Final = 90.0
 
 @dataclass(frozen=True)
 class WalkingParams:
-    """What counts as walking and as turning.
+    """Detection of walking and turning.
 
     Parameters
     ----------
-    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. own_share, least_leg_rate,
-        pause_s : who moves more slowly walks from this share of their own pace on, at least of so much, and
-        pauses of so long are part of the walk (docs/science/calibration.md, "Straight walking").
-    trunk_std : std |f| of a trunk sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has
-        at least 1.9 rad/s and 0.73 m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and
-        0.07).
-    shortest_s : shortest straight part that is used.
+    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. own_share, least_leg_rate, pause_s :
+        a slower person walks above this fraction of their own pace, at least at the second, and pauses up to
+        the third are part of the walk (docs/science/calibration.md, "Straight walking"). trunk_std : std |f|
+        of a trunk sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has at least 1.9
+        rad/s and 0.73 m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and 0.07).
+    shortest_s : shortest straight part used.
     turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn
         (docs/science/calibration.md, "Parameters"). Without a trunk sensor the cut-off is halved, because
         legs yaw with every step.
@@ -58,7 +57,7 @@ class WalkingParams:
 
 
 def moving_mask(recording: UniformRecording, params: WalkingParams) -> Bools:
-    """Samples (n,) at which somebody moves as in walking: by the legs, without leg sensors by the trunk."""
+    """Samples (n,) of walking-like movement: from the leg sensors, or the trunk without them."""
     legs = [s for s in recording.sensors if s not in TRUNK]
     if not legs:
         width = max(1, round(recording.rate_hz))
@@ -126,15 +125,16 @@ def turning_mask(
 
 
 def turn_sensors(recording: UniformRecording) -> list[Segment]:
-    """The steadiest sensors that show a turn, those that never were lost if there are any."""
+    """The steadiest sensors for detecting turns, preferably those without data loss."""
     groups = [[s for s in group if s in recording.sensors] for group in DOWN]
     whole = [[s for s in g if not _gaps(recording, s)] for g in groups]
     return next((g for g in (*whole, *groups) if g), [])
 
 
 def _gaps(recording: UniformRecording, segment: Segment) -> bool:
-    """Was the sensor lost for longer than the 0.1 s that are interpolated
-    (docs/science/timeline.md, "Rule")?"""
+    """Whether the sensor was lost for longer than the 0.1 s that are interpolated
+    (docs/science/timeline.md, "Rule").
+    """
     return any(b - a > 0.1 * recording.rate_hz for a, b in find_runs(~recording.sensors[segment].valid))
 
 
@@ -146,14 +146,16 @@ def straight_parts(
 
 
 def mean_turn(q: Floats, q_rest: Floats, part: tuple[int, int]) -> float:
-    """Circular mean of the angle in rad about the vertical from q_rest (4,) to q (n, 4) over a range."""
+    """Circular mean of the angle in rad about the vertical from q_rest (4,) to q (n, 4) over an index
+    range.
+    """
     return float(np.angle(np.exp(1j * measure_turned_angle(q[part[0] : part[1]], q_rest)).mean()))
 
 
 def measure_turned_angle(q: Floats, q_rest: Floats) -> Floats:
-    """Angle (n,) in rad by which q (n, 4) is turned about the vertical against q_rest (4,).
+    """Angle (n,) in rad by which q (n, 4) is rotated about the vertical relative to q_rest (4,).
 
-    The twist of the rotation about z: it exists for any mounting of the sensor.
+    The twist component of the rotation about z; it is defined for any sensor alignment.
     """
     d = multiply(q, conjugate(q_rest))
     return wrap_angle(np.asarray(2.0 * np.arctan2(d[..., 3], d[..., 0])))

@@ -1,4 +1,4 @@
-"""Which way a sensor walked: directions of strides, of a velocity from rest to rest, of the first steps."""
+"""Walking directions of a sensor: from strides, from rest-to-rest velocity, and from the first steps."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from sagittal.core.calibration.standing import SensorAtRest
 from sagittal.core.calibration.walking import TRUNK
 from sagittal.core.errors import Notice
 from sagittal.core.frames import FOOT, Bools, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import SensorSignals
 from sagittal.core.signals.rest import Window
 
@@ -42,13 +43,13 @@ was wrong."""
 
 @dataclass(frozen=True, eq=False)
 class CalibrationWalk:
-    """The straight walking that shows the direction, as seen from the rest that calibration uses.
+    """The straight walking used for the direction, relative to the calibration rest.
 
     Parameters
     ----------
-    rest : the whole rest window. leads : it comes before the walk. parts : straight parts, the nearest first.
-    bearing : turn of each part since standing, rad. span : index range between two rests, None if there is no
-    second rest near enough. mask : (n,) samples of the parts. steps_s : step time in each part,
+    rest : the whole rest window. leads : it precedes the walk. parts : straight parts, the nearest first.
+    bearing : heading change of each part since standing, rad. span : index range between two rests, None
+    without a second rest near enough. mask : (n,) samples of the parts. steps_s : step time in each part,
     None without a trunk sensor.
     """
 
@@ -64,7 +65,7 @@ class CalibrationWalk:
 
 @dataclass(frozen=True, eq=False)
 class SignedWays:
-    """Walking directions that have a sign; None where there is none, or a better one.
+    """Walking directions with a known sign; None if unavailable, or superseded by a better one.
 
     Parameters
     ----------
@@ -78,11 +79,12 @@ class SignedWays:
 
 @dataclass(frozen=True, eq=False)
 class ChosenWay:
-    """The direction that was chosen, and what is told of it.
+    """The chosen direction and its diagnostics.
 
     Parameters
     ----------
-    off : of the axis of the acceleration from what gave the sign, rad."""
+    off : deviation of the acceleration axis from the direction that determined the sign, rad.
+    """
 
     chosen: WalkingDirection
     off: float
@@ -97,7 +99,7 @@ def measure_ways(
     walk: CalibrationWalk,
     params: HeadingParams,
 ) -> SignedWays:
-    """Measure them for one sensor; a : (n,) its horizontal acceleration, m/s²."""
+    """Compute the directions of one sensor; a : (n,) its horizontal acceleration, m/s²."""
     velocity = _rest_to_rest_direction(a, walk, params)
     strides = _by_strides(segment, signals, standing, a, walk, params)
     if strides is not None or velocity is not None:
@@ -117,7 +119,7 @@ def _by_strides(
     walk: CalibrationWalk,
     params: HeadingParams,
 ) -> WalkingDirection | None:
-    """Direction of a foot's strides, each from one flat moment to the next; None for other segments."""
+    """Direction of a foot's strides between foot-flat moments; None for other segments."""
     if segment not in FOOT.values():
         return None
     flats = find_flat_moments(
@@ -129,7 +131,7 @@ def _by_strides(
 def _rest_to_rest_direction(
     a: Complexes, walk: CalibrationWalk, params: HeadingParams
 ) -> WalkingDirection | None:
-    """Direction of the velocity between two rests, None where there is no second one."""
+    """Direction of the velocity between two rests, None without a second one."""
     if walk.span is None:
         return None
     first, last = walk.span
@@ -139,7 +141,7 @@ def _rest_to_rest_direction(
 
 
 def choose_way(ways: SignedWays, axis: WalkingDirection) -> ChosenWay | None:
-    """The best of the directions, or the axis of the acceleration with its sign; None where there is none."""
+    """The best of the directions, or the acceleration axis with its sign; None without any."""
     best = next((w for w in (ways.strides, ways.velocity, ways.start) if w is not None), None)
     if best is None:
         return None
@@ -161,7 +163,7 @@ def choose_way(ways: SignedWays, axis: WalkingDirection) -> ChosenWay | None:
 def list_ways(
     ways: SignedWays, heard: tuple[ForwardMeasure, ...], params: ForwardParams
 ) -> tuple[ForwardMeasure, ...]:
-    """What the directions say of the forward axis, after what its axes say; strides speak alone."""
+    """Forward-axis measures: those of the axes followed by the best direction; strides replace all others."""
     if ways.strides is not None:
         return (ForwardMeasure("strides", ways.strides.angle, params.strides_sd, params.strides_doubt),)
     if ways.velocity is not None:
@@ -174,11 +176,16 @@ def list_ways(
 
 
 def tell_disagreement(segment: Segment, off: float) -> Notice:
-    """Say that strides and acceleration show different ways, `off` rad apart."""
+    """Notice that strides and acceleration give different directions, `off` rad apart."""
     return Notice(
         "heading_disagreement",
-        f"{segment}: strides and acceleration show ways {abs(degrees(off)):.0f}° apart, "
-        f"{degrees(DISAGREEMENT):.0f}° are expected at most; the strides were used. Frontal and "
-        "transverse angles of this segment are doubtful; look at the mounting.",
+        Message(
+            "{segment}: strides and acceleration show ways {abs:.0f}° apart, {DISAGREEMENT:.0f}° "
+            "are expected at most; the strides were used. Frontal and transverse angles of this "
+            "segment are doubtful; look at the mounting.",
+            segment=segment,
+            abs=abs(degrees(off)),
+            DISAGREEMENT=degrees(DISAGREEMENT),
+        ),
         sensor=segment,
     )

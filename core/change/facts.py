@@ -1,4 +1,4 @@
-"""Which changes say something new: figures that are one fact by their definition count once."""
+"""Grouping of changes: parameters that are equivalent by definition count as one change."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ require_entries((*SAME_AS, *(to for to, _ in SAME_AS.values())), "sagittal.core.
 
 @dataclass(frozen=True)
 class ChangedFact:
-    """A change beyond the measurement error.
+    """A change larger than the measurement error.
 
     Parameters
     ----------
-    change : of the figure that stands for it. same : real changes that say the same, in the order given.
+    change : of the representative parameter. same : equivalent real changes, in the order given.
     """
 
     change: Change
@@ -44,18 +44,18 @@ class ChangedFact:
 
     @property
     def relevant(self) -> bool:
-        """Some figure of it is clinically relevant."""
+        """Whether any of its parameters changed by a clinically relevant amount."""
         return any(c.verdict == "clinically_relevant" for c in (self.change, *self.same))
 
 
 @dataclass(frozen=True)
 class SortedChanges:
-    """The changes between two sessions, each fact once.
+    """The changes between two sessions, equivalent parameters grouped.
 
     Parameters
     ----------
-    real : beyond the measurement error, in the order given. within : facts inside it.
-    unjudged : facts with a difference and no verdict.
+    real : changes larger than the measurement error, in the order given. within : number of groups within it.
+    unjudged : number of groups with a difference but no verdict.
     """
 
     real: tuple[ChangedFact, ...] = ()
@@ -64,7 +64,7 @@ class SortedChanges:
 
 
 def name_fact(name: str, side: Side | None) -> Fact:
-    """The fact that a figure of a side says; what both sides share has none."""
+    """Group that a parameter of one side belongs to; parameters shared by both sides have no side."""
     to, of = SAME_AS.get(name, (name, "own"))
     entry = CATALOGUE.get(to)
     if of == "take" or side is None or (entry is not None and entry.shared):
@@ -73,9 +73,9 @@ def name_fact(name: str, side: Side | None) -> Fact:
 
 
 def sort_changes(changes: Sequence[Change]) -> SortedChanges:
-    """Sort changes by their verdict; a fact is real where any figure of it is.
+    """Sort changes by their verdict; a group is real if any parameter in it is.
 
-    Changes without a difference are left out.
+    Changes without a difference are omitted.
     """
     facts: dict[Fact, list[Change]] = {}
     for c in changes:

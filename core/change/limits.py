@@ -1,8 +1,8 @@
-"""How much a figure must change to be more than measurement error, and to matter.
+"""How much a parameter must change to exceed measurement error, and to be clinically important.
 
 docs/science/change.md, "Limits and their sources". MDC: the minimal detectable change at 95 % unless its
-source says otherwise. MCID: the minimal clinically important difference. Each was found on certain people
-with a certain method; both are printed beside it.
+source states otherwise. MCID: the minimal clinically important difference. Each limit was determined in a
+certain population with a certain method; both are printed with it.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 
 Limb = Literal["affected", "unaffected"]
@@ -24,11 +25,11 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True)
 class ChangeLimit:
-    """A smallest change of one figure.
+    """Smallest detectable or important change of one parameter.
 
     Parameters
     ----------
-    value : in the unit of the figure. people : who it was found on. source : where.
+    value : in the unit of the parameter. people : population it was determined in. source : reference.
     """
 
     value: float
@@ -38,11 +39,12 @@ class ChangeLimit:
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Measurement error of a figure from people measured repeatedly without treatment.
+    """Measurement error of a parameter, from people measured repeatedly without treatment.
 
     Parameters
     ----------
-    sem : standard error of measurement, within people. mdc95 : 1.96 √2 sem. people, repeats : behind it.
+    sem : standard error of measurement, within people. mdc95 : 1.96 √2 sem. people, repeats : numbers it is
+    based on.
     """
 
     sem: float
@@ -52,16 +54,17 @@ class Repeatability:
 
     @property
     def limit(self) -> ChangeLimit:
-        """As a limit of change."""
+        """Return this repeatability as a limit of change."""
         return ChangeLimit(
             self.mdc95,
-            f"{self.people} people of this clinic",
+            Message("{people} people of this clinic", people=self.people),
             f"own repeated measurements, n = {self.people}",
         )
 
 
 def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability | None:
-    """Measurement error from one list of values per person; None with fewer than five people measured twice.
+    """Estimate measurement error from one list of values per person; None with fewer than five people
+    measured twice.
 
     SEM² = pooled variance within people (Weir 2005, J Strength Cond Res 19:231).
     """
@@ -74,12 +77,12 @@ def estimate_repeatability(values: Sequence[Sequence[float]]) -> Repeatability |
 
 
 def find_detectable_change(name: str, baseline: float, limb: Limb | None = None) -> ChangeLimit | None:
-    """MDC of a parameter; None where no source has one.
+    """MDC of a parameter; None if no source reports one.
 
     Parameters
     ----------
-    baseline : value before; speed has limits by how fast somebody walked.
-    limb : None = no side is affected: the larger limit of the two.
+    baseline : earlier value; limits for speed depend on the walking speed.
+    limb : None = no affected side: the larger of the two limits.
     """
     entry = CATALOGUE.get(name)
     key = None if entry is None else entry.change
@@ -96,7 +99,7 @@ def detectable_ratio(name: str) -> ChangeLimit | None:
 
 
 def find_relevant_change(name: str, limb: Limb | None = None) -> ChangeLimit | None:
-    """MCID of a parameter or score; None where no source has one."""
+    """MCID of a parameter or score; None if no source reports one."""
     entry = CATALOGUE.get(name)
     key = name if entry is None else entry.change
     if key in _BY_LIMB:
@@ -125,10 +128,14 @@ _SPEED: Final = (
 
 _KESAR: Final = "Kesar et al. 2011 (Gait Posture 33:314), treadmill"
 _MDC: Final = {
-    "step_length": ChangeLimit(0.067, _CHRONIC, f"{_KESAR}, affected side"),
+    "step_length": ChangeLimit(0.067, _CHRONIC, Message("{KESAR}, affected side", KESAR=_KESAR)),
     "hip_extension": ChangeLimit(11.5, _CHRONIC, _KESAR),
-    "angle": ChangeLimit(11.5, _CHRONIC, f"{_KESAR}: the largest of its joint angles, 3.8 to 11.5°"),
-    "share": ChangeLimit(4.2, _CHRONIC, f"{_KESAR}: the largest of its temporal limits, 3.2 to 4.2 %"),
+    "angle": ChangeLimit(
+        11.5, _CHRONIC, Message("{KESAR}: the largest of its joint angles, 3.8 to 11.5°", KESAR=_KESAR)
+    ),
+    "share": ChangeLimit(
+        4.2, _CHRONIC, Message("{KESAR}: the largest of its temporal limits, 3.2 to 4.2 %", KESAR=_KESAR)
+    ),
 }
 """`ParameterEntry.change` → limit. Angles and shares of which only the range of all limits was read take its
 largest."""
@@ -142,7 +149,11 @@ def _pair(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit,
 
 
 def _from_sem(affected: float, unaffected: float, source: str) -> tuple[ChangeLimit, ChangeLimit]:
-    return _pair(_mdc95(affected), _mdc95(unaffected), f"{source}, 1.96 √2 of its error of measurement")
+    return _pair(
+        _mdc95(affected),
+        _mdc95(unaffected),
+        Message("{source}, 1.96 √2 of its error of measurement", source=source),
+    )
 
 
 _BY_LIMB: Final = {

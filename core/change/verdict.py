@@ -1,8 +1,8 @@
-"""Two sessions → what changed: within measurement error, real, or clinically relevant.
+"""Compare two sessions: changes within measurement error, real changes, clinically relevant changes.
 
-docs/science/change.md, "Verdict". "Real" only beyond the MDC, "clinically relevant" only beyond MDC and MCID.
-A published MDC takes enough strides for granted: the limit is never smaller than what the strides of the two
-sessions leave open.
+docs/science/change.md, "Verdict". A change is "real" only above the MDC, "clinically relevant" only above
+both MDC and MCID. A published MDC assumes enough strides: the limit is never smaller than the uncertainty due
+to the strides of the two sessions.
 """
 
 from __future__ import annotations
@@ -44,20 +44,20 @@ NOT_MEASURED_ALIKE: Final = "not_measured_alike"
 
 @dataclass(frozen=True)
 class Change:
-    """One figure in two sessions; beyond `limit` (MDC) the change is real, beyond `mcid` relevant too.
+    """One parameter in two sessions; above `limit` (MDC) the change is real, above `mcid` also relevant.
 
     Parameters
     ----------
     before, after : values; difference = after − before, in `unit`.
-    limit, limit_source, people : the change must pass this to be real; None without a source.
-    mcid, mcid_source : and this to matter; None without a source.
-    verdict : None with a `reason`: "no_value" (one of the sessions has none, or of other sides),
+    limit, limit_source, people : threshold for a real change; None without a source.
+    mcid, mcid_source : threshold for a relevant change; None without a source.
+    verdict : None with a `reason`: "no_value" (missing in one session, or available for different sides),
         "not_measured_alike" (one is estimated, the other measured: no difference either), "too_few_strides"
-        in one of them, "no_mdc" (no source has a limit for it), "conditions_differ" (not walked alike,
+        in one of them, "no_mdc" (no published limit), "conditions_differ" (different walking conditions,
         core/subject/condition.py).
-    towards_norm : fewer standard deviations from the mean of the norm than before, each visit against the
-        norm at its own speed; None where one of them has no comparable norm.
-    note : "from_standing": a change of how the person stands is part of it.
+    towards_norm : whether the distance from the norm mean, in standard deviations, decreased, each visit
+    compared at its own speed; None if one of them has no comparable norm.
+    note : "from_standing": includes any change in standing posture.
     """
 
     name: str
@@ -84,13 +84,13 @@ def parameter_changes(
     norms: tuple[Mapping[str, NormValue], Mapping[str, NormValue]] | None = None,
     own: Mapping[str, Repeatability] | None = None,
 ) -> tuple[Change, ...]:
-    """Compare the parameters of two sessions, in the order of the later one.
+    """Compare the parameters of two sessions, in the order of the later session.
 
     Parameters
     ----------
     affected : side, None = none or both.
-    norms : references by name, each session's at its own speed; without them changes have no direction.
-    own : measurement error of this clinic by name; it goes before any published limit.
+    norms : reference values by name, per session at its own speed; without them changes have no direction.
+    own : measurement error of this clinic by name; takes precedence over published limits.
     """
     earlier = {(p.name, p.side): p for p in before}
     of_before, of_after = norms or ({}, {})
@@ -107,7 +107,7 @@ def parameter_changes(
 
 
 def ratio_changes(before: Sequence[Symmetry], after: Sequence[Symmetry]) -> tuple[Change, ...]:
-    """Compare the side ratios of two sessions; only ratios affected / unaffected have limits."""
+    """Compare the side ratios of two sessions; limits exist only for ratios affected / unaffected."""
     earlier = {s.name: s for s in before}
     changes = []
     for s in after:
@@ -125,7 +125,7 @@ def score_changes(
 ) -> tuple[Change, ...]:
     """Compare the scores of two sessions, raw with raw and shape with shape; names as `score_name`.
 
-    No source has an MDC of the GPS; without the clinic's own there is no verdict.
+    No source reports an MDC of the GPS; without the clinic's own there is no verdict.
     """
     earlier = {(score_name(s), s.side): s.value for s in before}
     changes = []
@@ -142,7 +142,7 @@ def score_changes(
 
 
 def withdraw_verdicts(change: Change) -> Change:
-    """The same difference between takes that were not walked alike: no verdict, no direction."""
+    """Keep the differences between recordings under different conditions, without verdict and direction."""
     if change.difference is None:
         return change
     return replace(change, verdict=None, towards_norm=None, reason=UNLIKE)
@@ -183,9 +183,10 @@ def _parameter(
 
 
 def _strides(old: Parameter, new: Parameter) -> float:
-    """Half width of the interval of a difference of two means: of strides, and of what takes measure anew.
+    """Half width of the confidence interval of a difference of two means: strides and per-recording
+    uncertainty.
 
-    What both takes share, as the definition of a contact, is in both values and not in their difference.
+    Errors common to both recordings, such as the definition of a contact, cancel in the difference.
     """
     halves = [
         0.5 * (p.ci_high - p.ci_low) for p in (old, new) if p.ci_low is not None and p.ci_high is not None

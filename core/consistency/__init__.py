@@ -1,1 +1,1 @@
-"""Laws that the results of a walk must obey, whatever the person: where one is broken, a result is wrong."""
+"""Constraints that the results of every walk must satisfy; a violated one indicates a wrong result."""

@@ -1,8 +1,8 @@
-"""Both feet make the same strides: counts and stride times of left and right while walking.
+"""Both feet make the same strides: consistency of counts and stride times between left and right.
 
-Whoever walks, each contact of one foot lies between two of the other. A foot whose contacts were found in
-part, or twice, breaks that, and so do two clocks at different rates. What needs both feet is then withheld
-(docs/science/consistency.md).
+In walking, each contact of one foot falls between two contacts of the other. A foot with missed or doubled
+contacts violates this, and so do two clocks at different rates. Results that need both feet are then
+suppressed (docs/science/consistency.md).
 """
 
 from __future__ import annotations
@@ -35,12 +35,14 @@ def judge_feet(
     bouts: Sequence[Bout],
     is_measured: Callable[[Side, Floats], Bools],
 ) -> tuple[Notice, ...]:
-    """Say where left and right contradict each other; nothing where too little was walked to tell.
+    """Report contradictions between left and right; nothing if too little walking was recorded to decide.
 
     Parameters
     ----------
-    events, strides : as they count, edits included. bouts : walking, by the contacts of both feet.
-    is_measured : whether a foot's sensor was there at times (n,) s; contacts of the other foot count then.
+    events, strides : as used for the parameters, edits included. bouts : walking, by the contacts of both
+    feet.
+    is_measured : whether a foot's sensor was recording at times (n,) s; only then are contacts of the other
+    foot counted.
     """
     counts = {side: _count_contacts(events, side, bouts, is_measured) for side in SIDES}
     more = max(counts.values())

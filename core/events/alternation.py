@@ -1,8 +1,8 @@
-"""Do left and right foot keep one time? What their double supports say where nothing else links them.
+"""Timing consistency of left and right foot, from their double supports if nothing else links them.
 
-With one foot's clock late by τ, both its contact and its lift come late: the double support after the other
-foot's contact grows by τ and the other one shrinks by τ. A limp that stands or swings unequally changes
-neither much (docs/science/agreement.md, "Feet alone").
+If the clock of one foot is late by τ, both its contact and its foot-off are late: the double support after
+the other foot's contact grows by τ and the other one shrinks by τ. A limp with unequal stance or swing
+changes neither much (docs/science/agreement.md, "Feet alone").
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from sagittal.core.errors import Notice
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.frames import SIDES, Floats, Segment, Side
+from sagittal.core.message import Message
 
 FURTHEST_S: Final = 0.45
 """A lift further from a contact belongs to another step."""
@@ -22,14 +23,14 @@ FURTHEST_S: Final = 0.45
 
 @dataclass(frozen=True)
 class AlternationParams:
-    """When two feet are said to be out of time.
+    """Criteria for a clock offset between the two feet.
 
     Parameters
     ----------
-    least_s : half the difference of the two double supports. 22 walks of healthy people (ipol_walks,
-        hand-checked events) have up to 0.010 s, simulated patients up to 0.045 s (antalgic).
-    note_s : from here on it is said that a limp and a wrong clock look alike.
-    least_steps : of either kind; fewer say nothing.
+    least_s : half the difference of the two double supports. 22 walks of healthy people (ipol_walks, manually
+        verified events) have up to 0.010 s, simulated patients up to 0.045 s (antalgic).
+    note_s : threshold for a notice that a limp and a wrong clock cannot be distinguished.
+    least_steps : minimum number of steps of either kind.
     """
 
     least_s: float = 0.060
@@ -38,7 +39,7 @@ class AlternationParams:
 
 
 def measure_foot_lag(events: GaitEvents, params: AlternationParams) -> float | None:
-    """Time by which the right foot seems later than the left one, s; None with too few steps."""
+    """Apparent delay of the right foot relative to the left one, s; None with too few steps."""
     after: dict[Side, Floats] = {}
     for side, other in zip(SIDES, reversed(SIDES), strict=True):
         contact, lift = np.array(events.times(side, "ic")), np.sort(events.times(other, "tc"))
@@ -56,7 +57,7 @@ def measure_foot_lag(events: GaitEvents, params: AlternationParams) -> float | N
 
 
 def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice, ...]:
-    """Say that one foot seems late, where it does."""
+    """Notice on an apparent delay of one foot, if any."""
     lag = measure_foot_lag(events, params)
     if lag is None or abs(lag) <= params.note_s:
         return ()
@@ -65,9 +66,13 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
         return (
             Notice(
                 "feet_out_of_time",
-                f"The two double supports differ by {2000 * abs(lag):.0f} ms. A limp looks like this, so "
-                f"does a clock {1000 * abs(lag):.0f} ms late. No sensor between the feet tells which: "
-                "the ± of step times allows for it.",
+                Message(
+                    "The two double supports differ by {abs:.0f} ms. A limp looks like this, so does a "
+                    "clock {abs2:.0f} ms late. No sensor between the feet tells which: the ± of step "
+                    "times allows for it.",
+                    abs=2000 * abs(lag),
+                    abs2=1000 * abs(lag),
+                ),
                 late,
                 severity="info",
             ),
@@ -75,10 +80,14 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
     return (
         Notice(
             "feet_out_of_time",
-            f"The two double supports differ by {2000 * abs(lag):.0f} ms: the "
-            f"{'right' if lag > 0 else 'left'} foot seems {1000 * abs(lag):.0f} ms late. "
-            "A wrong clock looks like this, a strong limp rarely. Step times and double support are "
-            "doubtful; synchronise the sensors.",
+            Message(
+                "The two double supports differ by {abs:.0f} ms: the "
+                f"{'right' if lag > 0 else 'left'} foot seems {{abs2:.0f}} ms late. A wrong clock "
+                "looks like this, a strong limp rarely. Step times and double support are doubtful; "
+                "synchronise the sensors.",
+                abs=2000 * abs(lag),
+                abs2=1000 * abs(lag),
+            ),
             late,
         ),
     )

@@ -1,9 +1,9 @@
 """Contacts → walking bouts, and the stops inside and between them.
 
-A bout is walking without a long break; a gait that only shuffles the feet once is none. Terms and the two
-limits: docs/science/strides.md, "Walking bouts" (mobgap's rules as executed: at least 4 strides in total,
-breaks of at most 3 s). A step that takes too long is a break in the row of contacts: one was missed, or the
-person stopped. It is called a stop only where the sensors saw the person stand.
+A bout is walking without a long break; a single shuffle of the feet is none. Definitions and the two limits:
+docs/science/strides.md, "Walking bouts" (mobgap's rules as implemented: at least 4 strides in total, breaks
+of at most 3 s). An overlong step is a break in the sequence of contacts: a contact was missed, or the person
+stopped. It is called a stop only if the sensors show quiet standing.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from sagittal.core.signals.rest import Window
 
 @dataclass(frozen=True)
 class WalkParams:
-    """When contacts are walking.
+    """Criteria for walking.
 
     Parameters
     ----------
-    break_s : longest time between two contacts of a bout. min_strides : least strides of a bout, those of
-        both feet counted (mobgap).
+    break_s : longest time between two contacts of a bout. min_strides : minimum number of strides in a bout,
+        counting both feet (mobgap).
     """
 
     break_s: float = 3.0
@@ -36,12 +36,12 @@ class WalkParams:
 
 @dataclass(frozen=True)
 class RowParams(WalkParams):
-    """And when its steps follow each other.
+    """Criteria for breaks between steps.
 
     Parameters
     ----------
-    long_share : a step that takes so many times the median step of its bout is a break. Our choice: the steps
-        of the virtual patients stay below 1.7, a start or end of gait included.
+    long_share : a step longer than this multiple of the median step of its bout is a break. Our choice: the
+        steps of the simulated patients stay below 1.7, including gait initiation and termination.
     """
 
     long_share: float = 2.0
@@ -49,16 +49,16 @@ class RowParams(WalkParams):
 
 @dataclass(frozen=True)
 class BoutParams(RowParams):
-    """And when somebody stops.
+    """Criteria for stops.
 
     Parameters
     ----------
-    long_s : shortest such step, so that quick walking has none. Our choice.
-    stand_s : time of standing in a break from which it is a stop; with one foot known a stride more, as it
-        stands in each. Our choice: both feet are never at rest together for so long in walking (ipol_walks,
-        gaitmap_foot, neura_walk, all virtual patients).
-    near_s : a rest so close to a bout's end is where the walk began or ended. Our choice: the longest rest
-        that the quiet window of 1 s cannot see (core/signals/rest.py) and a step.
+    long_s : shortest break, so that fast walking has none. Our choice.
+    stand_s : minimum standing time in a break to call it a stop; one stride more with one foot known, since a
+        foot is at rest in every stride. Our choice: both feet are never at rest together for this long in
+        walking (ipol_walks, gaitmap_foot, neura_walk, all simulated patients).
+    near_s : a rest this close to the end of a bout is its start or end. Our choice: the longest rest that the
+        quiet window of 1 s cannot detect (core/signals/rest.py) plus one step.
     """
 
     long_s: float = 1.0
@@ -72,12 +72,12 @@ class Bout:
 
     Parameters
     ----------
-    start_s : the foot that steps first leaves the floor, or its contact where the leaving is not known.
+    start_s : first foot-off, or the first contact if the foot-off is unknown.
     first_s, end_s : first and last contact. contacts : number of contacts, of both feet.
     step_s : median time between contacts; with one foot known, of its strides.
-    breaks : half-open ranges between two contacts that are too far apart for one step. stops : those in which
-        the person stood.
-    from_rest, to_rest : standing still before and after; None where rest is not known.
+    breaks : half-open ranges between two contacts too far apart for one step. stops : those with quiet
+        standing.
+    from_rest, to_rest : quiet standing before and after; None if rest is unknown.
     """
 
     start_s: float
@@ -97,7 +97,9 @@ class Bout:
 
     @property
     def initiation_s(self) -> float | None:
-        """Gait initiation: first foot-off to first contact, s; None unless it starts from rest with one."""
+        """Gait initiation: first foot-off to first contact, s; None unless the bout starts from rest with a
+        known foot-off.
+        """
         return self.first_s - self.start_s if self.from_rest and self.first_s > self.start_s else None
 
 
@@ -109,13 +111,13 @@ def walking_bouts(
     params: BoutParams | None = None,
     standing: Sequence[Window] = (),
 ) -> tuple[Bout, ...]:
-    """Walking bouts of contacts in order of time.
+    """Walking bouts from contacts in chronological order.
 
     Parameters
     ----------
-    contacts, leavings : initial and terminal contacts of all feet that are known, s, increasing.
-    rests : windows of rest, None if not known. feet : how many feet the contacts are of.
-    standing : windows in which nothing that steps moved; a stop is told only in these.
+    contacts, leavings : initial and terminal contacts of all known feet, s, increasing.
+    rests : windows of rest, None if unknown. feet : number of feet with contacts.
+    standing : windows without movement of the feet; stops are reported only within these.
     """
     params = params or BoutParams()
     found = []
@@ -146,7 +148,7 @@ def walking_bouts(
 
 
 def plain_bouts(contacts: Sequence[float], params: WalkParams) -> tuple[Bout, ...]:
-    """Walking bouts of contacts of two feet, of which neither breaks nor rests are asked."""
+    """Walking bouts from contacts of two feet, without breaks and rests."""
     return tuple(
         Bout(run[0], run[0], run[-1], len(run), float(np.median(np.diff(run))))
         for run in _walks(contacts, 2, params)
@@ -159,7 +161,7 @@ def find_bouts(
     params: BoutParams | None = None,
     standing: Sequence[Window] = (),
 ) -> tuple[Bout, ...]:
-    """Walking bouts of the contacts of the feet; arguments as of `walking_bouts`."""
+    """Walking bouts from the contacts of the feet; arguments as in `walking_bouts`."""
     of_feet = [events.times(side, "ic") for side in SIDES]
     contacts = sorted(chain(*of_feet))
     leavings = sorted(chain(*(events.times(side, "tc") for side in SIDES)))
@@ -168,7 +170,7 @@ def find_bouts(
 
 
 def _walks(contacts: Sequence[float], feet: int, params: WalkParams) -> list[list[float]]:
-    """Successive contacts without a long break, enough of them for walking."""
+    """Sequences of contacts without a long break, long enough for walking."""
     runs: list[list[float]] = []
     for t in contacts:
         if runs and t - runs[-1][-1] <= params.break_s:
@@ -180,12 +182,12 @@ def _walks(contacts: Sequence[float], feet: int, params: WalkParams) -> list[lis
 
 
 def _overlap(one: Window, other: Window) -> float:
-    """Time that two ranges have in common, s."""
+    """Overlap of two ranges, s."""
     return min(one[1], other[1]) - max(one[0], other[0])
 
 
 def _touches(rests: Sequence[Window] | None, t: float, near_s: float, *, before: bool) -> bool | None:
-    """Does a rest end shortly before t, or start shortly after it?"""
+    """Whether a rest ends shortly before t, or starts shortly after it."""
     if rests is None:
         return None
     return any(-0.5 <= (t - end if before else start - t) <= near_s for start, end in rests)

@@ -1,9 +1,10 @@
-"""Several detectors → one list of contacts, each with the share of detectors that saw it.
+"""Several detectors → one list of contacts, each with the fraction of detectors that found it.
 
-Detectors mean different moments by a contact (a zero crossing, a peak 50 ms later): each is first moved by
-its own median distance from the leading one, then contacts within a window are one. The lead's time is kept,
-so that a consensus is never less exact than the lead where both found a contact. A detector that abstained on
-a foot has no vote on it. All of this is our choice; validation/accuracy/test_events_consensus.py measures it.
+Detectors define a contact by different moments (a zero crossing, a peak 50 ms later): the median offset of
+each from the leading detector is removed first, then contacts within a window are merged. The lead's time is
+used, so that a consensus is never less accurate than the lead where both found a contact. A detector that
+abstained on a foot has no vote on it. All of this is our choice; validation/accuracy/test_events_consensus.py
+measures it.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from sagittal.core.events.foot_pitch import FootPitchParams
 from sagittal.core.events.gyro_peaks import LIMB, GyroPeakPresets, gyro_peak_events
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 
 if TYPE_CHECKING:
@@ -34,18 +36,20 @@ KINDS: Final[tuple[EventKind, EventKind]] = ("ic", "tc")
 
 @dataclass(frozen=True)
 class ConsensusParams:
-    """How detectors agree.
+    """Combination of detectors.
 
     Parameters
     ----------
-    presets : gyro-peak detectors beside the foot-pitch rule: one of the foot, two of the shank.
-    gyro_peaks : the rules of each of those that can be named.
-    window_s : contacts of one foot this close, after the median distance is taken off, are one.
-    pair_s, pairs : detectors' contacts this close make the median distance, from so many of them.
-    least : a contact needs this share of the votes, and more than it without the lead's.
-    shank_early_s : contacts led by a shank are moved later by this. They are 0.04 s early on neura_walk and
-        0.04 to 0.10 s on simulated people (docs/science/events.md, "Shanks alone"). Foot-offs are not moved:
-        0.05 s early on the one, 0.02 to 0.04 s late on the others.
+    presets : gyro-peak detectors used in addition to the foot-pitch rule: one for the foot, two for the
+        shank.
+    gyro_peaks : the rules of all selectable presets.
+    window_s : contacts of one foot within this time, after removal of the median offset, are merged.
+    pair_s, pairs : contacts of two detectors within this time contribute to the median offset, which needs
+        this number of pairs.
+    least : minimum fraction of votes for a contact; it must be exceeded without the lead's vote.
+    shank_early_s : delay added to contacts led by a shank, which are 0.04 s early in neura_walk and 0.04 to
+        0.10 s in simulated people (docs/science/events.md, "Shanks alone"). Foot-offs are not shifted: 0.05 s
+        early in the former, 0.02 to 0.04 s late in the latter.
     shank_sd_s : standard uncertainty of both, measured there.
 
     Raises
@@ -67,7 +71,11 @@ class ConsensusParams:
         if unknown := [name for name in self.presets if name not in known]:
             raise ParameterError(
                 "unknown_detector",
-                f"There is no detector '{unknown[0]}'; expected one of {', '.join(known)}.",
+                Message(
+                    "There is no detector '{unknown}'; expected one of {known}.",
+                    unknown=unknown[0],
+                    known=", ".join(known),
+                ),
             )
 
 
@@ -88,11 +96,11 @@ def all_detectors(
     params: ConsensusParams | None = None,
     refined: GaitEvents | None = None,
 ) -> dict[str, GaitEvents]:
-    """What every detector finds whose sensors are worn, the leading one of the feet first.
+    """Events of every detector whose sensors are available, the leading one of the feet first.
 
     Parameters
     ----------
-    refined : what `detect_contacts` found, which then leads; None = the foot-pitch rule leads.
+    refined : result of `detect_contacts`, which then leads; None = the foot-pitch rule leads.
     """
     params = params or ConsensusParams()
     found = {PITCH_RULE: detect(orientations, foot_pitch)} if refined is None else {REFINED: refined}
@@ -105,15 +113,16 @@ def all_detectors(
 
 
 def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
-    """The lead's contacts, none added and none taken away, with the share of detectors that saw each.
+    """The lead's contacts, unchanged in number, with the fraction of detectors that found each.
 
     Parameters
     ----------
-    found : detector → its events; the first leads. A foot on which no other detector voted keeps None.
+    found : detector → its events; the first leads. For a foot without other votes the confidence remains
+        None.
 
     Returns
     -------
-    the lead's events and notices; `others_found_contacts` where the lead abstained and two others did not.
+    The lead's events and notices; `others_found_contacts` if the lead abstained and two others did not.
     """
     params = params or ConsensusParams()
     name, lead = next(iter(found.items()))
@@ -140,13 +149,13 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
 
     Parameters
     ----------
-    found : detector → its events, all of one take; the first leads.
+    found : detector → its events, all for one recording; the first leads.
 
     Returns
     -------
-    events with `confidence`, the share of the detectors that did not abstain on the foot. The lead's notices
-    stay; `led_by_other` says where the lead abstained and others agreed, `detectors_disagree` how many
-    contacts of a foot only few saw.
+    Events with `confidence`, the fraction of detectors that did not abstain on the foot. The lead's notices
+    are kept; `led_by_other` reports a foot on which the lead abstained and others agreed,
+    `detectors_disagree` the number of contacts of a foot that only few detectors found.
     """
     params = params or ConsensusParams()
     lead = next(iter(found))
@@ -202,7 +211,7 @@ def _voters(found: Mapping[str, _Sorted], side: Side) -> dict[str, _Sorted]:
 def _clusters(
     voters: Mapping[str, _Sorted], side: Side, kind: EventKind, params: ConsensusParams
 ) -> list[list[_Vote]]:
-    """Contacts that are one, at most one vote of each detector, in order of time."""
+    """Contacts to be merged, with at most one vote per detector, in chronological order."""
     lead, *others = voters
     reference = [e.time_s for e in voters[lead][side, kind]]
     clusters = [[v] for v in _votes(lead, voters[lead][side, kind])]
@@ -229,7 +238,9 @@ def _votes(name: str, events: Sequence[GaitEvent]) -> list[_Vote]:
 
 
 def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -> list[_Vote]:
-    """Votes without the median distance of their detector from the lead's contacts, which are in order."""
+    """Votes after removal of the median offset of their detector from the lead's contacts, which are
+    sorted.
+    """
     if not lead or not votes:
         return votes
     reference, times = np.array(lead), np.array([v.time_s for v in votes])
@@ -248,8 +259,13 @@ def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
     counts = ", ".join(f"{name} {len(own[side, 'ic'])}" for name, own in voters.items())
     return Notice(
         "others_found_contacts",
-        f"Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with the"
-        " consensus of all detectors instead; compare its contacts with the signals.",
+        Message(
+            "Other detectors found contacts of the {side} foot ({counts}). The analysis can be "
+            "run with the consensus of all detectors instead; compare its contacts with the "
+            "signals.",
+            side=side,
+            counts=counts,
+        ),
         FOOT[side],
         severity="info",
     )
@@ -258,10 +274,16 @@ def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
 def _led_by_other(side: Side, leads: str, voters: Mapping[str, _Sorted]) -> Notice:
     return Notice(
         "led_by_other",
-        f"No contacts of the {side} foot were found by a foot sensor. These are of {leads}"
-        + (f" and {len(voters) - 1} more" if len(voters) > 1 else " alone")
-        + " (reconstructions of published ones), about 0.06 s from what a foot sensor would tell. Compare"
-        " them with the signals, and stance, swing and support only with takes of the same sensors.",
+        Message(
+            "No contacts of the {side} foot were found by a foot sensor. These are of {leads} "
+            + ("and {others} more" if len(voters) > 1 else "alone")
+            + " (reconstructions of published ones), about 0.06 s from what a foot sensor would "
+            "tell. Compare them with the signals, and stance, swing and support only with takes of "
+            "the same sensors.",
+            side=side,
+            leads=leads,
+            others=len(voters) - 1,
+        ),
         FOOT[side],
     )
 
@@ -271,10 +293,20 @@ def _disagree(side: Side, dropped: int, n: int) -> Notice:
         "detectors_disagree",
         plural(
             dropped,
-            f"{dropped} possible contact of the {side} foot was seen by too few of {n} detectors and is left"
-            " out.",
-            f"{dropped} possible contacts of the {side} foot were seen by too few of {n} detectors and are"
-            " left out.",
+            Message(
+                "{dropped} possible contact of the {side} foot was seen by too few of {value} "
+                "detectors and is left out.",
+                dropped=dropped,
+                side=side,
+                value=n,
+            ),
+            Message(
+                "{dropped} possible contacts of the {side} foot were seen by too few of {value} "
+                "detectors and are left out.",
+                dropped=dropped,
+                side=side,
+                value=n,
+            ),
         ),
         FOOT[side],
         severity="info",

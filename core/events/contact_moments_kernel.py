@@ -1,5 +1,7 @@
-"""Moments of contact and foot-off in the pitch and the knocks of a foot, compiled (docs/science/events.md,
-"Refinement"); foot_contact.py explains them, foot_contact_kernel.py runs them over a take or a stream."""
+"""Refined times of contact and foot-off from pitch and impacts of a foot, compiled
+(docs/science/events.md, "Refinement"); foot_contact.py explains them, foot_contact_kernel.py applies
+them to a recording or a stream.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ its fastest (our choice). No take is without acceleration, so it is no parameter
 
 
 class ContactRule(NamedTuple):
-    """`FootContactParams` at a sample rate; whole numbers are samples."""
+    """`FootContactParams` at a sample rate; integers are samples."""
 
     rate_hz: float
     contact_share: float
@@ -63,7 +65,7 @@ def knock_at(acc, j, apart):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
-    """Place j and value of the least pitch rate between samples first and last + 1."""
+    """Sample j and value of the minimum pitch rate between samples first and last + 1."""
     place, least = first, rate_at(pitch, first, rate_hz)
     for j in range(first + 1, last + 1):
         r = rate_at(pitch, j, rate_hz)
@@ -74,7 +76,7 @@ def deepest(pitch, rate_hz, first, last):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def highest(pitch, first, last):  # type: ignore[no-untyped-def]
-    """Sample of the highest pitch among first … last."""
+    """Sample of the maximum pitch among first … last."""
     size = pitch.shape[0]
     place = first
     for j in range(first, last + 1):
@@ -85,7 +87,7 @@ def highest(pitch, first, last):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def lowest(pitch, first, last):  # type: ignore[no-untyped-def]
-    """Sample of the lowest pitch among first … last."""
+    """Sample of the minimum pitch among first … last."""
     size = pitch.shape[0]
     place = first
     for j in range(first, last + 1):
@@ -96,9 +98,9 @@ def lowest(pitch, first, last):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def refine_landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Sample and uncertainty (s) of a contact whose highest pitch is at `top`, from samples first … last.
+    """Sample and uncertainty (s) of a contact with its maximum pitch at `top`, from samples first … last.
 
-    NaN where neither pitch nor acceleration shows it.
+    NaN if neither pitch nor acceleration shows it.
     """
     if last - top >= 2:
         place, slap = deepest(pitch, rate_hz, top, last - 1)
@@ -152,9 +154,9 @@ def refine_landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type:
 
 @inner_njit()
 def refine_leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Sample and uncertainty (s) of a foot-off whose lowest pitch is at `bottom`, from samples first …
+    """Sample and uncertainty (s) of a foot-off with its minimum pitch at `bottom`, from samples first …
 
-    NaN where the pitch rate shows no push-off, or one that is long over.
+    NaN if the pitch rate shows no push-off, or one that ended long before.
     """
     first = max(first, bottom - rule.leaving)
     if bottom - first < 2:
@@ -178,7 +180,7 @@ def refine_leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-unty
 
 @inner_njit()
 def guess_leaving(pitch, start, middle, reach, rule):  # type: ignore[no-untyped-def]
-    """Sample of the lowest pitch, foot-off and its uncertainty (s) of a movement from `start` on."""
+    """Sample of the minimum pitch, foot-off and its uncertainty (s) for a movement from `start` on."""
     size = pitch.shape[0]
     bottom = lowest(pitch, start, middle)
     at, sd = np.nan, 0.0

@@ -1,8 +1,8 @@
-"""Orientations → GaitEvents: the contacts of each foot, and what must be said about them.
+"""Orientations → GaitEvents: the contacts of each foot, with notices.
 
-`detect_contacts` is the product's: found by pitch and movement, refined to the moment of contact. `detect` is
-the foot-pitch rule of the thesis as it is published, which that is compared with.
-Source: docs/science/events.md, "Foot-pitch rule", "Refinement" and "Refusals".
+`detect_contacts` is the default detector: based on pitch and movement, refined to the moment of contact.
+`detect` is the foot-pitch rule of the thesis as published, for comparison. Source: docs/science/events.md,
+"Foot-pitch rule", "Refinement" and "Refusals".
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, adv
 from sagittal.core.events.foot_way import FootWayParams, FootWayState, advance_foot_ways
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import angle_between
 from sagittal.core.signals.held_samples import compare_neighbours, cut_blocks
 
@@ -43,7 +44,9 @@ KINDS: Final[tuple[EventKind, EventKind]] = ("tc", "ic")
 
 @dataclass(frozen=True)
 class PitchFigures:
-    """What one foot did: extremes of s, its level when quiet and in mid-stance or None, and events found."""
+    """Statistics of one foot: extremes of s, its level at rest and in mid-stance or None, and number of
+    events.
+    """
 
     s_min: float
     s_max: float
@@ -60,17 +63,17 @@ def detect_contacts(
     motions: Mapping[Segment, FootMovement | FootMovements] | None = None,
     ways: FootWayParams | None = None,
 ) -> GaitEvents:
-    """Contacts of each foot that carries a sensor, at the moment of contact, with their uncertainty.
+    """Contacts of each foot with a sensor, at the moment of contact, with their uncertainty.
 
     Parameters
     ----------
     orientations : with "foot_l", "foot_r" or both; a missing foot gives the notice `foot_missing`.
-    motions : how each foot moved; without it swings are found, and contacts refined, by pitch alone.
-    ways : of swings by their way, which are taken of a foot that its pitch misreads.
+    motions : movement of each foot; without it swings are detected, and contacts refined, from pitch alone.
+    ways : of swings detected from displacement, used for a foot that pitch misreads.
 
     Returns
     -------
-    events in order of time; diagnostics: foot → PitchFigures.
+    Events in chronological order; diagnostics: foot → PitchFigures.
 
     Raises
     ------
@@ -122,12 +125,12 @@ def find_by_way(
 def read_reports(
     told: ContactReports, side: Side, start_s: float, rate_hz: float, latest: dict[int, GaitEvent]
 ) -> Iterator[tuple[int, bool, GaitEvent]]:
-    """Sample at which it is told, whether nothing more is to come about it, and the event.
+    """Yield sample at which an event is reported, whether the report is final, and the event.
 
     Parameters
     ----------
-    start_s : time of sample 0. latest : number → event as it was told last, of earlier blocks too; kept up
-        to date. What is told again is one of the last few.
+    start_s : time of sample 0. latest : number → event as last reported, including earlier blocks; updated in
+        place. Only the last few events can be reported again.
     """
     for kind, number, known, last, at, uncertainty in zip(*told, strict=True):
         first = latest.get(int(number))
@@ -145,7 +148,7 @@ def read_reports(
 
 
 def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:
-    """Contacts of each foot by the published foot-pitch rule; as `detect_contacts` otherwise."""
+    """Contacts of each foot by the published foot-pitch rule; otherwise as `detect_contacts`."""
     rule = params or FootPitchParams()
 
     def find(side: Side) -> tuple[list[GaitEvent], bool]:
@@ -160,17 +163,21 @@ def _each_foot(
     params: FootPitchParams,
     find: Callable[[Side], tuple[list[GaitEvent], bool]],
 ) -> GaitEvents:
-    """What `find` gives for every foot that can be judged, and what must be said.
+    """Apply `find` to every usable foot, and collect notices.
 
     Parameters
     ----------
-    find : side → its contacts, and whether they are those by its way.
+    find : side → its contacts, and whether they come from displacement.
     """
     if orientations.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has"
-            f" {orientations.rate_hz:g} Hz. Record at a higher rate.",
+            Message(
+                "Gait events need at least {min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. "
+                "Record at a higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate_hz=orientations.rate_hz,
+            ),
         )
     events: list[GaitEvent] = []
     notices: list[Notice] = []
@@ -178,7 +185,9 @@ def _each_foot(
     for side in SIDES:
         foot = FOOT[side]
         if foot not in orientations.q or not orientations.valid[foot].any():
-            message = f"No sensor on the {side} foot, or no sample of it: its contacts are unknown."
+            message = Message(
+                "No sensor on the {side} foot, or no sample of it: its contacts are unknown.", side=side
+            )
             notices.append(Notice("foot_missing", message, foot))
             continue
         no_rest = [n for n in orientations.notices if n.code == "no_rest" and n.sensor in (None, foot)]
@@ -207,7 +216,7 @@ def _each_foot(
 def _pitch_events(
     side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
 ) -> list[GaitEvent]:
-    """Run the rule over the whole take of one foot."""
+    """Apply the rule to one foot over the whole recording."""
     kind, index, known, offset = advance_foot_pitch(
         FootPitchState.start(orientations.rate_hz, params), s, valid
     )
@@ -225,7 +234,7 @@ def _pitch_events(
 
 
 def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: FootPitchParams) -> float | None:
-    """Mean s over the quiet seconds of a foot, None if it has none."""
+    """Mean s over the quiet seconds of a foot, None without any."""
     second = max(2, round(rate_hz))
     whole = len(s) // second
     if whole == 0:
@@ -238,7 +247,9 @@ def _quiet_level(q: Floats, s: Floats, valid: Bools, rate_hz: float, params: Foo
 
 
 def _flat_level(events: list[GaitEvent], s: Floats, valid: Bools, orientations: Orientations) -> float | None:
-    """Median over a foot's stances of the mean s in their middle thirds, None without a whole stance."""
+    """Median over the stances of a foot of the mean s in their middle thirds, None without a complete
+    stance.
+    """
     ordered = sorted(events, key=lambda e: e.time_s)
     stances = [
         (contact.time_s, off.time_s - contact.time_s)
@@ -256,16 +267,19 @@ def _flat_level(events: list[GaitEvent], s: Floats, valid: Bools, orientations: 
 
 
 def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_way: bool) -> list[Notice]:
-    """Say what makes the events of one foot absent or doubtful."""
+    """Notices on why the events of one foot are missing or doubtful."""
     foot = FOOT[side]
     remarks = []
     if by_way:
         remarks.append(
             Notice(
                 "contacts_by_way",
-                f"The pitch of the {side} foot does not show its contacts, as of a foot that shuffles, is "
-                f"dragged or carried flat. They are found by the way it moves: {figures.n_ic} initial "
-                "contacts, known to about ± 0.05 s.",
+                Message(
+                    "The pitch of the {side} foot does not show its contacts, as in shuffling or dragging. "
+                    "They were detected from its displacement: {n_ic} initial contacts, to about ± 0.05 s.",
+                    side=side,
+                    n_ic=figures.n_ic,
+                ),
                 foot,
                 severity="info",
             )
@@ -274,9 +288,14 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
         remarks.append(
             Notice(
                 "no_toe_off",
-                f"The {side} foot never pitched below {_degrees(params.threshold)} (lowest was"
-                f" {_degrees(figures.s_min)}), so no contacts were found on it. A shuffling gait, no walking,"
-                " or a sensor on another segment looks like this.",
+                Message(
+                    "The {side} foot never pitched below {threshold} (lowest was {s_min}), so no "
+                    "contacts were found on it. A shuffling gait, no walking, or a sensor on another "
+                    "segment looks like this.",
+                    side=side,
+                    threshold=_degrees(params.threshold),
+                    s_min=_degrees(figures.s_min),
+                ),
                 foot,
             )
         )
@@ -284,9 +303,13 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
         remarks.append(
             Notice(
                 "rest_pose_suspect",
-                f"The {side} foot never pitched above {_degrees(params.suspect_max)} (highest was"
-                f" {_degrees(figures.s_max)}). Check that the person stood with the whole sole on the floor"
-                " during the rest.",
+                Message(
+                    "The {side} foot never pitched above {suspect_max} (highest was {s_max}). Check "
+                    "that the person stood with the whole sole on the floor during the rest.",
+                    side=side,
+                    suspect_max=_degrees(params.suspect_max),
+                    s_max=_degrees(figures.s_max),
+                ),
                 foot,
             )
         )
@@ -294,9 +317,14 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
         remarks.append(
             Notice(
                 "rest_pose_suspect",
-                f"The {side} foot is pitched by {_degrees(figures.s_quiet)} on average while it is quiet"
-                f" (expected within ±{_degrees(params.suspect_quiet)}). Check that the person stood with the"
-                " whole sole on the floor during the rest.",
+                Message(
+                    "The {side} foot is pitched by {s_quiet} on average while it is quiet (expected "
+                    "within ±{suspect_quiet}). Check that the person stood with the whole sole on the "
+                    "floor during the rest.",
+                    side=side,
+                    s_quiet=_degrees(figures.s_quiet),
+                    suspect_quiet=_degrees(params.suspect_quiet),
+                ),
                 foot,
             )
         )
@@ -304,21 +332,28 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
 
 
 def _stood_as_in_stance(figures: PitchFigures, params: FootPitchParams) -> bool:
-    """Whether a foot was pitched at rest as in mid-stance: one that drops, or hardly lifts its toes."""
+    """Whether the pitch of a foot at rest equals that in mid-stance: a foot that drops, or hardly lifts
+    its toes.
+    """
     return figures.s_flat is not None and abs(figures.s_flat) <= params.suspect_quiet
 
 
 def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams) -> Notice:
-    """Show both feet's counts when the threshold is not the published one."""
+    """Notice with the counts of both feet if the threshold is not the published one."""
     counts = ", ".join(f"{foot} {f.n_ic} initial contacts" for foot, f in figures.items())
     return Notice(
         "event_threshold_changed",
-        f"Contacts were found with a push-off threshold of {params.threshold:g} instead of"
-        f" {FootPitchParams.threshold:g}: {counts}. Compare the feet: a higher threshold can lose most"
-        " contacts of a drop foot.",
+        Message(
+            "Contacts were found with a push-off threshold of {threshold:g} instead of {threshold2:g}: "
+            "{counts}. Compare the feet: a higher threshold can lose most contacts of a drop "
+            "foot.",
+            threshold=params.threshold,
+            threshold2=FootPitchParams.threshold,
+            counts=counts,
+        ),
     )
 
 
 def _degrees(s: float) -> str:
-    """Pitch of a value of s, in words for a person."""
+    """Pitch for a value of s, formatted for display."""
     return f"{np.degrees(np.arcsin(np.clip(s, -1.0, 1.0))):.1f}°".replace("-", "−")

@@ -1,8 +1,8 @@
-"""What a person changes in a take's events and strides: records, and the pure functions that apply them.
+"""Manual edits of events and strides: records, and the pure functions that apply them.
 
-The detector's events stay as they were found; a list of edits in the order in which they were made gives the
-events and strides that count. Undo is leaving the last edit out. A stride is named by a moment inside it, so
-that a decision about it survives a shift of its contacts.
+The detector's events are never modified; the edits, applied in the order in which they were made, give the
+events and strides in use. Undo removes the last edit. A stride is identified by a moment inside it, so that a
+decision about it remains valid when its contacts are shifted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, Final, Literal, cast, get_args
 from sagittal.core.errors import ParameterError
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, Strides
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 
 EditKind = Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
 KINDS: Final[tuple[EditKind, ...]] = get_args(EditKind)
@@ -34,18 +35,17 @@ SOURCE: Final = "manual"
 
 @dataclass(frozen=True)
 class Edit:
-    """One change.
+    """One edit.
 
     Parameters
     ----------
-    time_s : of the event that is moved or deleted, of the new event, or a moment inside the stride, s.
-    event : kind of the event; None for strides. to_s : where the event is moved; else None.
-    reason : why a stride is left out, a line of text; else None.
+    time_s : of the event to move or delete, of the new event, or a moment inside the stride, s.
+    event : kind of the event; None for strides. to_s : new time of a moved event; else None.
+    reason : why a stride is excluded, a line of text; else None.
 
     Raises
     ------
-    ParameterError
-        `bad_edit`: a member is missing, not finite, or not for this kind of edit.
+    ParameterError `bad_edit`: a field is missing, not finite, or not applicable to this kind of edit.
     """
 
     kind: EditKind
@@ -75,12 +75,12 @@ class Edit:
             )
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values without the empty members."""
+        """Plain values without empty fields."""
         return {k: v for k, v in asdict(self).items() if v is not None}
 
 
 def read_edit(values: dict[str, Any]) -> Edit:
-    """The edit that `to_json` wrote; raises ParameterError bad_edit."""
+    """Parse an edit written by `to_json`; raises ParameterError bad_edit."""
     try:
         return Edit(**values)
     except TypeError as error:
@@ -88,13 +88,12 @@ def read_edit(values: dict[str, Any]) -> Edit:
 
 
 def apply_event_edits(events: GaitEvents, edits: Iterable[Edit], duration_s: float) -> GaitEvents:
-    """The events after all edits of events, in order of time.
+    """The events after all event edits, in chronological order.
 
     Raises
     ------
-    ParameterError
-        `no_such_event`; `event_outside` the recording; `event_order`: it would pass, or come within `APART_S`
-        of, another event of its foot.
+    ParameterError `no_such_event`; `event_outside` the recording; `event_order`: it would pass another event
+        of its foot, or come within `APART_S` of it.
     """
     found = list(events.events)
     for edit in edits:
@@ -112,9 +111,9 @@ def apply_event_edits(events: GaitEvents, edits: Iterable[Edit], duration_s: flo
 
 
 def apply_stride_edits(strides: Strides, edits: Iterable[Edit]) -> Strides:
-    """The stride list with a person's decisions: the last one about a stride holds, over any rule.
+    """The stride list with manual decisions: the last decision about a stride overrides any rule.
 
-    A decision about a moment that no stride contains any more has no effect.
+    Decisions about a moment that is no longer inside a stride have no effect.
     """
     listed = list(strides.strides)
     for edit in edits:
@@ -127,7 +126,7 @@ def apply_stride_edits(strides: Strides, edits: Iterable[Edit]) -> Strides:
 
 
 def find_stride(strides: Sequence[Stride], side: Side, time_s: float) -> int | None:
-    """Place of the stride of a foot that contains a moment, None if there is none."""
+    """Index of the stride of a foot that contains a moment, None without one."""
     return next((i for i, s in enumerate(strides) if s.side == side and s.start_s <= time_s < s.end_s), None)
 
 
@@ -137,7 +136,11 @@ def _place(found: Sequence[GaitEvent], edit: Edit) -> int:
             return i
     raise ParameterError(
         "no_such_event",
-        f"There is no {_name(edit)} at {edit.time_s:.3f} s; it may have been changed meanwhile. Load again.",
+        Message(
+            "There is no {edit} at {time_s:.3f} s; it may have been changed meanwhile. Load again.",
+            edit=_name(edit),
+            time_s=edit.time_s,
+        ),
         t_s=edit.time_s,
     )
 
@@ -146,7 +149,11 @@ def _refuse_outside(time_s: float, duration_s: float) -> None:
     if not 0.0 <= time_s <= duration_s:
         raise ParameterError(
             "event_outside",
-            f"{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
+            Message(
+                "{time_s:.3f} s is outside the recording; expected 0 to {duration_s:.3f} s.",
+                time_s=time_s,
+                duration_s=duration_s,
+            ),
             t_s=time_s,
         )
 
@@ -156,8 +163,14 @@ def _put(found: list[GaitEvent], edit: Edit, time_s: float) -> None:
     if near is not None:
         raise ParameterError(
             "event_order",
-            f"The {_name(edit)} at {time_s:.3f} s would be less than {1000 * APART_S:.0f} ms from another "
-            f"event of that foot at {near.time_s:.3f} s; delete that one first.",
+            Message(
+                "The {edit} at {time_s:.3f} s would be less than {APART_S:.0f} ms from another event "
+                "of that foot at {time_s2:.3f} s; delete that one first.",
+                edit=_name(edit),
+                time_s=time_s,
+                APART_S=1000 * APART_S,
+                time_s2=near.time_s,
+            ),
             t_s=time_s,
         )
     found.append(GaitEvent(time_s, edit.side, cast("EventKind", edit.event), SOURCE, time_s))
@@ -169,8 +182,11 @@ def _refuse_passing(found: Iterable[GaitEvent], edit: Edit, from_s: float, to_s:
     if passed is not None:
         raise ParameterError(
             "event_order",
-            f"The {_name(edit)} cannot pass another event of that foot at {passed.time_s:.3f} s; delete that "
-            "one first.",
+            Message(
+                "The {edit} cannot pass another event of that foot at {time_s:.3f} s; delete that one first.",
+                edit=_name(edit),
+                time_s=passed.time_s,
+            ),
             t_s=to_s,
         )
 
@@ -180,4 +196,4 @@ def _name(edit: Edit) -> str:
 
 
 def _bad(what: str) -> ParameterError:
-    return ParameterError("bad_edit", f"This edit is not as expected: {what}.")
+    return ParameterError("bad_edit", Message("This edit is not as expected: {what}.", what=what))

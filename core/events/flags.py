@@ -1,8 +1,8 @@
-"""What the neighbours of a cycle say about it, and which of its flags sets it aside.
+"""Flags of a gait cycle from its neighbours, and exclusion by flags.
 
-A flag is an observation and stays; the reason of exclusion is a decision made from it. How gait starts, stops
-and turns is no steady walking however short the walk; only strides next to a turn count where hardly anything
-else would be left.
+A flag is an observation and is kept; the reason for exclusion is a decision derived from it. Gait initiation,
+termination and turns are not steady walking, however short the walk; only strides next to a turn are counted
+if hardly any others are left.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ YIELDING: Final[StrideFlag] = "near_turn"
 
 @dataclass(frozen=True)
 class StrideParams:
-    """When a cycle counts.
+    """Criteria for counting a cycle.
 
     Parameters
     ----------
-    min_s : shorter is two events of one step; the detector itself cannot follow shorter cycles
+    min_s : shorter cycles are two events of one step; the detector cannot resolve shorter ones
         (docs/science/events.md, "Limits").
-    max_s : longer is a stop, not a stride (mobgap's stride rule: at most 3 s).
-    bout_break_s : a walking bout ends where a foot makes no contact for longer (mobgap: 3 s; same place).
+    max_s : longer cycles are stops, not strides (mobgap's stride rule: at most 3 s).
+    bout_break_s : a walking bout ends if a foot makes no contact for longer (mobgap: 3 s; same place).
     turn_rad : heading change of the foot over a stride that counts as turning. Our choice: straight strides
         of gaitmap_foot and neura_walk stay within 15°, turning ones exceed 30°.
-    turn_share : share of a stride inside the pelvis turning mask that counts as turning. Our choice.
-    turn_margin : strides set aside on each side of a turn (two steps, as clinics drop them). On
+    turn_share : fraction of a stride inside the pelvis turning mask that counts as turning. Our choice.
+    turn_margin : strides excluded on each side of a turn (two steps, as in clinical practice). In
         gaitmap_foot these six strides last 4 % longer, two standard deviations, than the steady ones.
-    edge_strides : strides set aside at each end of a bout: gait starts and stops within them
+    edge_strides : strides excluded at each end of a bout: gait starts and stops within them
         (docs/science/strides.md, "Flags").
-    outlier_sd : a stride time further from the foot's median than so many robust standard deviations
-        (1.4826 × median absolute deviation) …
-    outlier_share : … and than this share of the median is an outlier. Our choice: the share keeps all that
-        gait itself varies, the worst virtual patient included; a stop inside a stride exceeds it.
-    outlier_from : least number of strides of a foot to call one of them an outlier. Our choice.
-    run_strides : fewer successive cycles than this are a shift of weight, not walking. Our choice: two, the
-        least that repeat.
-    min_kept : strides next to a turn count when fewer than these would be left on a foot. Our choice: three
-        strides are the least with a spread worth printing; the notice `short_walk` says so.
+    outlier_sd : a stride time that deviates from the foot's median by more than this number of robust
+        standard deviations (1.4826 × median absolute deviation) …
+    outlier_share : … and by more than this fraction of the median is an outlier. Our choice: natural gait
+        variability stays below it, including the worst simulated patient; a stop inside a stride exceeds it.
+    outlier_from : minimum number of strides of a foot for outlier detection. Our choice.
+    run_strides : fewer consecutive cycles are a shift of weight, not walking. Our choice: two, the minimum
+        for a repetition.
+    min_kept : strides next to a turn are counted if fewer than this would be left on a foot. Our choice:
+        three strides are the minimum for a meaningful spread; a notice `short_walk` is given.
     """
 
     min_s: float = 0.4
@@ -68,12 +68,12 @@ class StrideParams:
 
 
 def flag_cycles(own: Sequence[Stride], params: StrideParams) -> list[Stride]:
-    """The cycles of one foot in order of time with the flags their neighbours give them added."""
+    """The cycles of one foot in chronological order, with the flags from their neighbours added."""
     return [add_flag(s, *more) for s, more in zip(own, find_flags(own, params), strict=True)]
 
 
 def find_flags(own: Sequence[Stride], params: StrideParams) -> list[set[StrideFlag]]:
-    """Flags of each cycle of one foot in order of time, its own and those its neighbours give it."""
+    """Flags of each cycle of one foot in chronological order, its own and those from its neighbours."""
     more: list[set[StrideFlag]] = [set(s.flags) for s in own]
     for run in _runs(own, params):
         for i in run[: params.edge_strides]:
@@ -92,14 +92,14 @@ def find_flags(own: Sequence[Stride], params: StrideParams) -> list[set[StrideFl
 
 
 def add_flag(stride: Stride, *more: StrideFlag) -> Stride:
-    """The cycle with these flags too, in their order."""
+    """The cycle with additional flags, in canonical order."""
     if all(f in stride.flags for f in more):
         return stride
     return replace(stride, flags=tuple(f for f in ORDER if f in more or f in stride.flags))
 
 
 def decide_exclusions(strides: Sequence[Stride], params: StrideParams) -> tuple[list[Stride], bool]:
-    """Set cycles aside by the first of their flags; True where those next to a turn had to count."""
+    """Exclude cycles by the first of their flags; True if those next to a turn had to be counted."""
     strict = [_set_aside(s, next(iter(s.flags), None)) for s in strides]
     left = Counter(s.side for s in strict if s.excluded_reason is None)
     if all(left[s.side] >= params.min_kept for s in strict if s.excluded_reason == YIELDING):
@@ -116,7 +116,7 @@ def _but_near_turn(stride: Stride) -> StrideFlag | None:
 
 
 def _runs(own: Sequence[Stride], params: StrideParams) -> list[list[int]]:
-    """Places of successive cycles without a break."""
+    """Indices of consecutive cycles without a break."""
     runs: list[list[int]] = [[]]
     for i, stride in enumerate(own):
         if stride.duration_s > params.bout_break_s:
@@ -127,7 +127,7 @@ def _runs(own: Sequence[Stride], params: StrideParams) -> list[list[int]]:
 
 
 def _outliers(own: Sequence[Stride], params: StrideParams) -> list[int]:
-    """Places of whole cycles whose time is far from the foot's median."""
+    """Indices of complete cycles with a duration far from the foot's median."""
     whole = [i for i, s in enumerate(own) if _BROKEN.isdisjoint(s.flags)]
     if len(whole) < params.outlier_from:
         return []

@@ -1,10 +1,10 @@
-"""Contacts of a foot at the moment of contact: found by its pitch and by its movement, then refined.
+"""Contacts of a foot at the moment of contact: detected from its pitch and movement, then refined.
 
-The pitch rule (foot_pitch.py) tells that a foot has left or landed; its extrema are early at contact and late
-at foot-off. The pitch rate and the knock around them have the moment that a force plate means: the sole
-begins to slap down, the push-off is over. A swing that hardly pitches the foot (in a turn, a first or last
-step, a shuffle) is found by its movement between two rests. docs/science/events.md, "Refinement" and "Swings
-without pitch". One kernel runs over a file and over a stream.
+The pitch rule (foot_pitch.py) detects that a foot has left the floor or landed; its extrema are early at
+contact and late at foot-off. The pitch rate and the impact around them mark the moment measured by a force
+plate: the foot begins to slap down, the push-off ends. A swing that hardly pitches the foot (in a turn, a
+first or last step, a shuffle) is detected from its movement between two rests. docs/science/events.md,
+"Refinement" and "Swings without pitch". One kernel processes files and streams.
 """
 
 from __future__ import annotations
@@ -23,41 +23,45 @@ from sagittal.core.frames import Bools, Floats
 
 @dataclass(frozen=True)
 class FootContactParams:
-    """Parameters of refinement and of swings without pitch.
+    """Parameters of the refinement and of swings without pitch.
 
-    The three sets are ipol_walks, gaitmap_foot and force_plate_steps; validation/report.md, "Contacts against
-    every reference", has every one of them.
+    The three data sets are ipol_walks, gaitmap_foot and force_plate_steps; validation/report.md, "Contacts
+    against every reference", reports all of them.
 
     Parameters
     ----------
-    contact_share : a contact is half way between the moment the pitch rate last falls through this share of
-        the slap, its deepest value after the highest pitch, and the first knock of this share of the hardest
-        until then. Chosen on the three sets together.
-    knock_s : over so long a change of the acceleration is a knock. Our choice: a sample at 100 Hz.
-    contact_s : the slap is looked for in so long after the contact is known; the refined time follows then.
-    leaving_share : a foot-off is where the pitch rate comes back through this share of the push-off, its
-        deepest value in the `leaving_s` before the lowest pitch. Chosen on the three sets together.
-    push_s : further from the lowest pitch the push-off belongs to something else. Our choice.
-    least_rad_s : a shallower slap or push-off is none. Our choice: 29°/s.
-    lead_s, lag_s : mean distance from the pitch rule's contact and foot-off to the refined ones on the three
-        sets; stands in until the refined time is known, and where there is none.
-    still_rad_s, still_s : a foot slower than this for so long is at rest. Our choice.
-    swing_rad_s, swing_s, longest_s, step_m : a movement between two rests that is so fast, so long and leads
-        so far is a swing. Measured on ipol_walks: swings without pitch exceed 1.5 rad/s and 0.3 s and most
-        lead 11 cm and more, shifts of a standing foot lead less far.
-    least_s : a shorter swing is none: the lowest pitch was that of the landing, and the foot-off is told
-        again where the movement begins. Our choice: landings of all sets have up to 0.08 s, swings from 0.16.
-    pause_s : a swing without pitch is told where the foot's last pitched swing is no longer ago, else once
-        the next follows within this: mobgap's longest pause inside a walk. A gait without any pitched swing
-        is not told by halves.
-    hump_rad : a rise of the pitch that ends in a slap is a landing though the foot does not rest. Our choice.
-    dip_rad, onset_s : a pitch that falls by less shows no push-off; the foot then leaves so long after it
-        begins to move, the median of ipol_walks.
-    contact_sd_s, leaving_sd_s : standard uncertainty of a clear event, definition and person included: root
-        mean square over the three sets. Most of it is the same for all events of a foot. Half the distance of
-        the two features of a contact, and half that from foot-off to lowest pitch, are added as squares.
-    flat_sd_s : of a landing without a slap. late_sd_s : of the pitch rule's time with the mean distance.
-    loose_sd_s : the least of a swing without pitch. All measured on ipol_walks.
+    contact_share : a contact is half way between the moment the pitch rate last falls through this fraction
+        of the slap, its minimum after the highest pitch, and the first impact of this fraction of the hardest
+        one until then. Chosen on the three sets together.
+    knock_s : interval of the acceleration change that defines an impact. Our choice: one sample at 100 Hz.
+    contact_s : search window for the slap after detection of the contact; the refined time is available at
+        its end.
+    leaving_share : a foot-off is where the pitch rate returns through this fraction of the push-off, its
+        minimum in the `leaving_s` before the lowest pitch. Chosen on the three sets together.
+    push_s : largest distance of the push-off from the lowest pitch. Our choice.
+    least_rad_s : minimum magnitude of a slap or push-off. Our choice: 29°/s.
+    lead_s, lag_s : mean offset from the pitch rule's contact and foot-off to the refined ones in the three
+        sets; used until the refined time is available, and if there is none.
+    still_rad_s, still_s : a foot slower than this for this time is at rest. Our choice.
+    swing_rad_s, swing_s, longest_s, step_m : speed, duration and distance that make a movement between two
+        rests a swing. Measured on ipol_walks: swings without pitch exceed 1.5 rad/s and 0.3 s and most cover
+        at least 11 cm, shifts of a standing foot less.
+    least_s : minimum duration of a swing: for shorter ones the lowest pitch was that of the landing, and the
+        foot-off is reported again at the beginning of the movement. Our choice: landings of all sets have up
+        to 0.08 s, swings from 0.16.
+    pause_s : a swing without pitch is reported if the foot's last pitched swing is not longer ago, otherwise
+        once the next one follows within this time: mobgap's longest pause inside a walk. A gait without any
+        pitched swing is not reported in part.
+    hump_rad : minimum rise of the pitch before a slap that counts as landing although the foot does not rest.
+        Our choice.
+    dip_rad, onset_s : minimum fall of the pitch for a push-off; with less, foot-off is assumed onset_s after
+        the start of movement, the median of ipol_walks.
+    contact_sd_s, leaving_sd_s : standard uncertainty of a clear event, including definition and person: root
+        mean square over the three sets. Most of it is common to all events of a foot. Half the distance
+        between the two features of a contact, and half that from foot-off to lowest pitch, are added in
+        quadrature.
+    flat_sd_s : of a landing without a slap. late_sd_s : of the pitch rule's time with the mean offset.
+        loose_sd_s : minimum for a swing without pitch. All measured on ipol_walks.
     """
 
     contact_share: float = 0.4
@@ -91,11 +95,11 @@ _NOTHING: Final = np.zeros((1, 3))
 
 
 class ContactReports(NamedTuple):
-    """What a block made known, in order: (m,) each.
+    """Reports of a block, in order: (m,) each.
 
-    kind : 0 = TC, 1 = IC. number : of the event, from 0. known : sample at which it is told. last : nothing
-    more is to come about this event; a foot-off whose swing proves too short is told again all the same.
-    at : sample of the event, with a fraction. uncertainty_s : standard.
+    kind : 0 = TC, 1 = IC. number : of the event, from 0. known : sample at which it is reported. last : no
+    further report on this event; nevertheless a foot-off whose swing proves too short is reported again. at :
+    sample of the event, with a fraction. uncertainty_s : standard.
     """
 
     kind: NDArray[np.int64]
@@ -115,13 +119,13 @@ WINDOWS: Final = {
 
 @dataclass(eq=False)
 class FootContactState:
-    """What is remembered between two blocks of one foot.
+    """State carried between two blocks of one foot.
 
     Parameters
     ----------
     rule : of the pitch. refinement : the parameters in the order of the kernel's.
-    pitch : (m,) the last pitches, rad. acc : (m, 3) the last specific forces.
-    counters, sums : places named in foot_contact_kernel.py.
+    pitch : (m,) the last pitches, rad. acc : (m, 3) the last specific forces. counters, sums : indices named
+        in foot_contact_kernel.py.
     """
 
     rule: FootPitchState
@@ -135,7 +139,7 @@ class FootContactState:
     def start(
         cls, rate_hz: float, pitch: FootPitchParams | None = None, params: FootContactParams | None = None
     ) -> FootContactState:
-        """State before the first sample at `rate_hz`."""
+        """Initial state at `rate_hz`."""
         # numba is slow to import and only needed here
         from sagittal.core.events.contact_moments_kernel import ContactRule
         from sagittal.core.events.foot_contact_kernel import (
@@ -169,13 +173,13 @@ class FootContactState:
 def advance_foot_contacts(
     state: FootContactState, q: Floats, valid: Bools, speed: Floats | None = None, acc: Floats | None = None
 ) -> ContactReports:
-    """Advance one foot by a block of samples, in place.
+    """Process a block of samples of one foot, in place.
 
     Parameters
     ----------
     q : (n, 4) foot to W. valid : (n,) False where the sensor was lost.
     speed : (n,) norm of the angular rate, rad/s, without bias. acc : (n, 3) specific force, foot axes, m/s².
-        Without them contacts are found and refined by pitch alone.
+        Without them contacts are detected and refined from pitch alone.
     """
     room = 4 * (len(q) // (state.rule.window + 1) + 3)
     found_int, found_float = np.empty((room, 4), np.int64), np.empty((room, 2))
@@ -202,13 +206,13 @@ _NO_REPORTS: Final = ContactReports(_NONE, _NONE, _NONE, np.empty(0, np.bool_), 
 
 @cache
 def _load_kernel() -> Callable[..., int]:
-    """The compiled rule: numba is slow to import and only needed to run it."""
+    """Import the compiled rule lazily: numba is slow to import and only needed to run it."""
     from sagittal.core.events.foot_contact_kernel import foot_contact_kernel
 
     return cast("Callable[..., int]", foot_contact_kernel)
 
 
 def compile_foot_contact_kernel() -> None:
-    """Compile (or load from the cache) the kernel, so that the first analysis does not wait for it."""
+    """Compile the kernel or load it from the cache, so that the first analysis is not delayed."""
     q = np.array([[1.0, 0.0, 0.0, 0.0]])
     advance_foot_contacts(FootContactState.start(100.0), q, np.ones(1, np.bool_))

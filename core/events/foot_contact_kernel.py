@@ -1,4 +1,4 @@
-"""The compiled part of the contacts (docs/science/events.md, "Refinement"); foot_contact.py explains it."""
+"""Compiled contact detection (docs/science/events.md, "Refinement"); explained in foot_contact.py."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ for 0.43)."""
 
 @inner_njit()
 def _read_rule(x):  # type: ignore[no-untyped-def]
-    """The rule in an array (26,): a tuple would take longer to hand over than the block to go through."""
+    """The rule as an array (26,): passing a tuple would take longer than processing the block."""
     return ContactRule(
         x[0], x[1], x[2], x[3], x[4], x[5], x[6], x[7], x[8], x[9], x[10], x[11], x[12], x[13], x[14], x[15],
         x[16], int(x[17]), int(x[18]), int(x[19]), int(x[20]), int(x[21]), int(x[22]), int(x[23]), int(x[24]),
@@ -79,7 +79,7 @@ def _read_rule(x):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
-    """Write one report; returns how many there are."""
+    """Write one report; returns the number of reports."""
     found_int[total, 0], found_int[total, 1] = kind, number
     found_int[total, 2], found_int[total, 3] = known, last
     found_float[total, 0], found_float[total, 1] = at, sd
@@ -88,7 +88,7 @@ def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # 
 
 @inner_njit()
 def _hold(counters, sums, k, off, off_sd, landing, landing_sd):  # type: ignore[no-untyped-def]
-    """Hold a swing without pitch that ended at sample k, in the place of the oldest where none is free."""
+    """Store a swing without pitch that ended at sample k, replacing the oldest if there is no free slot."""
     if counters[LOOSE] == RHYTHM:
         counters[LOOSE] -= 1
         for j in range(LOOSE_AT, LOOSE_AT + 4 * counters[LOOSE]):
@@ -102,7 +102,7 @@ def _hold(counters, sums, k, off, off_sd, landing, landing_sd):  # type: ignore[
 
 @inner_njit()
 def _walks_on(counters, sums, rule):  # type: ignore[no-untyped-def]
-    """Whether the last swings without pitch follow each other as strides do."""
+    """Whether the last swings without pitch follow each other like strides."""
     if counters[LOOSE] < RHYTHM:
         return False
     first = sums[LOOSE_AT + 6] - sums[LOOSE_AT + 2]
@@ -116,7 +116,7 @@ def _walks_on(counters, sums, rule):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _tell_held(found_int, found_float, total, counters, sums, k, wanted):  # type: ignore[no-untyped-def]
-    """Report the untold of the last `wanted` swings without pitch; returns how many reports there are."""
+    """Report the unreported ones of the last `wanted` swings without pitch; returns the number of reports."""
     for n in range(counters[LOOSE] - min(wanted, counters[UNTOLD]), counters[LOOSE]):
         for kind, place in ((TC, LOOSE_AT + 4 * n), (IC, LOOSE_AT + 4 * n + 2)):
             at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
@@ -128,9 +128,10 @@ def _tell_held(found_int, found_float, total, counters, sums, k, wanted):  # typ
 
 @inner_njit()
 def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule):  # type: ignore[no-untyped-def]
-    """Tell the last foot-off again where a contact at `at` is too near; returns how many reports there are.
+    """Report the last foot-off again if a contact at `at` is too close; returns the number of reports.
 
-    No swing is so short: the lowest pitch was that of the landing, the foot left as its movement began.
+    No swing is that short: the lowest pitch was that of the landing, the foot left the floor when its
+    movement began.
     """
     start, left = counters[START], sums[LEFT_AT]
     if at - left >= rule.least or start < reach or start >= left:
@@ -142,14 +143,16 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
 
 @inner_njit()
 def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
-    """A movement of the foot begins at sample k."""
+    """Start a movement of the foot at sample k."""
     counters[START], counters[TOP], counters[TOLD] = k, k, told
     sums[:OFFSET] = 0.0
 
 
 @inner_njit()
 def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
-    """Add one sample to the horizontal velocity and way of a movement; gravity has no part in them."""
+    """Add one sample to the horizontal velocity and displacement of a movement; gravity has no horizontal
+    component.
+    """
     w, x, y, z = q
     ax, ay, az = acc
     a = (1.0 - 2.0 * (y * y + z * z)) * ax + 2.0 * (x * y - w * z) * ay + 2.0 * (x * z + w * y) * az
@@ -162,7 +165,7 @@ def _add_way(sums, q, acc, rate_hz):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Whether a movement from rest to rest over `samples` is a swing: fast, long, and away from its place."""
+    """Whether a movement from rest to rest over `samples` is a swing: fast, long, and with displacement."""
     half = 0.5 * samples / rate_hz
     a, b = sums[WAY] - half * sums[SPEED], sums[WAY + 1] - half * sums[SPEED + 1]
     long = rule.swing <= end - start <= rule.longest
@@ -171,7 +174,7 @@ def _leads_far(sums, samples, end, start, rate_hz, rule):  # type: ignore[no-unt
 
 @inner_njit()
 def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untyped-def]
-    """Whether the highest pitch of the movement, a slap's length ago, was a landing."""
+    """Whether the highest pitch of the movement, followed by a slap, was a landing."""
     start, top, size = counters[START], counters[TOP], pitch.shape[0]
     if k != top + rule.after or top - start < 2:
         return False
@@ -184,8 +187,9 @@ def _lands_between(pitch, counters, k, rate_hz, rule):  # type: ignore[no-untype
 def _close_contact(  # type: ignore[no-untyped-def]
     found_int, found_float, total, pitch, acc, counters, sums, k, measured, reach, moves, rule
 ):  # fmt: skip
-    """Tell a contact whose window has ended, here or with the last sample that was `measured`; returns how
-    many reports there are."""
+    """Report a contact whose window has ended, here or with the last `measured` sample; returns the number
+    of reports.
+    """
     top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
     at, sd = refine_landing(pitch, acc, top, first, measured, moves, rule.rate_hz, rule)
     if at != at:
@@ -204,8 +208,9 @@ def _close_contact(  # type: ignore[no-untyped-def]
 def _take_extreme(  # type: ignore[no-untyped-def]
     found_int, found_float, total, pitch, counters, sums, k, reach, kind, index, offset, rule
 ):  # fmt: skip
-    """Tell an event of the pitch rule: a foot-off for good, a contact until its window ends; returns how many
-    reports there are."""
+    """Report an event of the pitch rule: a foot-off finally, a contact provisionally until its window
+    ends; returns the number of reports.
+    """
     counters[TOLD], counters[PITCHED] = 1, k
     if counters[HELD] >= k - rule.pause:
         # the foot walks on: its step before was one
@@ -230,8 +235,10 @@ def _find_swing(  # type: ignore[no-untyped-def]
     found_int, found_float, total, pitch, acc, counters, sums, k, reach, first, end, top, swinging, moves,
     off, off_sd, rule,
 ):  # fmt: skip
-    """Tell the contact of a swing that the pitch rule waits for, or hold a step without pitch until the foot
-    walks on; returns how many reports there are. top : sample of the highest pitch, −1 if not known."""
+    """Report the contact of a swing that the pitch rule is waiting for, or store a step without pitch
+    until walking continues; returns the number of reports. top : sample of the highest pitch, −1 if
+    unknown.
+    """
     if top < 0:
         top = highest(pitch, first + (end - first) // 2, end)
     at, sd = refine_landing(pitch, acc, top, first, k, moves, rule.rate_hz, rule)
@@ -255,14 +262,14 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
     q, speed, acc, valid, moves, pitch_ring, pitch_counters, pitch_held, window, need, threshold,
     fall, pitch, accs, counters, sums, rules, found_int, found_float,
 ):  # fmt: skip
-    """Run over a block of one foot; returns how many reports were made.
+    """Process a block of one foot; returns the number of reports.
 
     Parameters
     ----------
     q, speed, acc, valid : (n, 4), (n,), (n, 3), (n,), see `advance_foot_contacts`; moves False: without speed
-        and acc. pitch_ring to fall : of the pitch rule. pitch to rules : see `FootContactState`; pitch, accs,
-        counters and sums are advanced in place.
-    found_int : (room, 4) kind, number of the event, sample at which it is known, 1 = its last report.
+        and acc. pitch_ring to fall : arguments of the pitch rule. pitch to rules : see `FootContactState`;
+        pitch, accs, counters and sums are advanced in place.
+    found_int : (room, 4) kind, number of the event, sample of the report, 1 = its last report.
     found_float : (room, 2) sample of the event, uncertainty in s.
     """
     rule, size = _read_rule(rules), pitch.shape[0]

@@ -1,4 +1,4 @@
-"""How a foot moved, beside its orientation: what tells a swing that hardly pitches it, and a knock."""
+"""Movement of a foot in addition to its orientation: reveals swings with little pitch, and impacts."""
 
 from __future__ import annotations
 
@@ -28,30 +28,30 @@ class FootMovement(NamedTuple):
 
     @classmethod
     def of_signals(cls, acc: Floats, gyr: Floats, mounted: SegmentCalibration) -> FootMovement:
-        """From signals (n, 3) of a sensor and how it sits."""
+        """From signals (n, 3) of a sensor and its sensor-to-segment alignment."""
         speed = find_lengths(gyr - mounted.gyro_bias)
         return cls(speed, acc @ mounted.R_segment_sensor.T)
 
     def cut(self, part: slice) -> FootMovement:
-        """Some of the samples."""
+        """A slice of the samples."""
         return FootMovement(self.speed[part], self.acc[part])
 
 
 @dataclass(frozen=True, eq=False)
 class FootMovements:
-    """Motion of one foot over a take, of the part that is asked for."""
+    """Motion of one foot over a recording, computed for the requested part only."""
 
     signals: SensorSignals
     mounted: SegmentCalibration
 
     def cut(self, part: slice) -> FootMovement:
-        """Some of the samples."""
+        """A slice of the samples."""
         signals = self.signals
         return FootMovement.of_signals(signals.cut("acc", part), signals.cut("gyr", part), self.mounted)
 
 
 def measure_foot_movements(calibrated: CalibratedRecording) -> Mapping[Segment, FootMovements]:
-    """Motion of every foot that is calibrated."""
+    """Motion of every calibrated foot."""
     mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
     return {
         foot: FootMovements(sensors[foot], mounted[foot])

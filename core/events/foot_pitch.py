@@ -1,12 +1,12 @@
 """Initial and terminal contact from the pitch of the foot: a real-time rule with two extrema per stride.
 
-Signal: s = upward component of the foot's forward axis, 0 at standing, toes up positive; it knows neither
-heading nor Euler angles. The foot leaves the floor at a minimum of s below −0.2, lands at the maximum after.
-Source: Nazarahari thesis ch. 6, Algorithm 1, with the departures of docs/science/events.md, "Departures from
-the thesis" (times in seconds, both the time of the extremum and the time it is known).
+Signal: s = upward component of the foot's forward axis, 0 at standing, toes up positive; independent of
+heading and of Euler angles. The foot leaves the floor at a minimum of s below −0.2 and lands at the following
+maximum. Source: Nazarahari thesis ch. 6, Algorithm 1, with the departures of docs/science/events.md,
+"Departures from the thesis" (times in seconds, both the time of the extremum and the time of detection).
 
-How near the maximum is to the true contact is a property of how a person lands, not of the rule: with a foot
-that pitches up until it touches it is within a few ms, otherwise early by up to 0.1 s
+The distance between the maximum and the true contact depends on how a person lands, not on the rule: with a
+foot that pitches up until it touches the floor it is within a few ms, otherwise early by up to 0.1 s
 (docs/science/events.md, "What the extrema mean"). An initial contact before the first terminal contact is not
 reported, by design.
 """
@@ -27,20 +27,22 @@ class FootPitchParams:
 
     Parameters
     ----------
-    window_s : an extremum must be extreme over this long before it; also the least time between two events
+    window_s : time before an extremum over which it must be extreme; also the minimum time between two events
         of one kind (thesis Alg 1: 15 samples at 100 Hz).
-    monotone_share : share of the window's steps that must lead towards the extremum (thesis Alg 1: 0.8).
+    monotone_share : fraction of the sample-to-sample changes in the window that must lead towards the
+        extremum (thesis Alg 1: 0.8).
     threshold : level of s between stance and push-off (thesis Alg 1: −0.2 = 11.5° toes down). Do not raise
-        it: at −0.1 a drop foot loses most of its contacts (docs/science/events.md, "Refusals").
-    fall : an initial contact with the toes up counts once s has fallen this far below its maximum, or by half
-        of it; what rises again before was a plateau of the swing, and the later maximum is taken. Our choice:
-        the additive noise on s that the rule stands (tests/core/events). A foot that lands on its heel
-        falls so far within a few samples: real recordings give the same contacts with and without.
-    min_rate_hz : below it the window holds fewer than six samples.
-    suspect_max : a foot that never pitches up beyond this was not level at rest, unless it is in mid-stance:
+        it: at −0.1 most contacts of a drop foot are missed (docs/science/events.md, "Refusals").
+    fall : an initial contact with the toes up is accepted once s has fallen by this amount below its maximum,
+        or by half of it; if s rises again before, it was a plateau of the swing, and the later maximum is
+        used. Our choice: the additive noise on s that the rule tolerates (tests/core/events). A foot landing
+        on its heel falls that far within a few samples: real recordings give the same contacts with and
+        without this rule.
+    min_rate_hz : at lower rates the window has fewer than six samples.
+    suspect_max : a foot that never pitches up above this was not level at rest, unless it is in mid-stance:
         6°, our choice.
     suspect_quiet : largest mean |s| of quiet standing, and of mid-stance: 6°, our choice.
-    quiet_rad_s : a second counts as quiet below this mean angular speed: standing, our choice.
+    quiet_rad_s : mean angular speed below which a second counts as quiet standing, our choice.
     """
 
     window_s: float = 0.150
@@ -55,14 +57,14 @@ class FootPitchParams:
 
 @dataclass(eq=False)
 class FootPitchState:
-    """What the rule remembers between two blocks of one foot.
+    """State of the rule carried between two blocks of one foot.
 
     Parameters
     ----------
-    ring : (window + 3,) the last values of s. counters : (6,) samples seen, valid samples in a row,
-        0 = stance or 1 = swing, sample of the last detection of TC and of IC, sample of the held maximum
-        or −1.
-    held : (3,) the held maximum, the value before it, its sub-sample offset (2 = not known yet).
+    ring : (window + 3,) the last values of s. counters : (6,) samples processed, consecutive valid samples, 0
+        = stance or 1 = swing, sample of the last detection of TC and of IC, sample of the pending maximum or
+        −1.
+    held : (3,) the pending maximum, the value before it, its sub-sample offset (2 = not yet known).
     """
 
     ring: Floats
@@ -75,7 +77,7 @@ class FootPitchState:
 
     @classmethod
     def start(cls, rate_hz: float, params: FootPitchParams) -> FootPitchState:
-        """State before the first sample at `rate_hz`."""
+        """Initial state at `rate_hz`."""
         window = round(params.window_s * rate_hz)
         never = -(1 << 40)
         return cls(
@@ -92,7 +94,7 @@ class FootPitchState:
 def advance_foot_pitch(
     state: FootPitchState, s: Floats, valid: Bools
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Floats]:
-    """Advance one foot by a block of samples, in place.
+    """Process a block of samples of one foot, in place.
 
     Parameters
     ----------
@@ -100,8 +102,8 @@ def advance_foot_pitch(
 
     Returns
     -------
-    (m,) kind 0 = TC, 1 = IC; (m,) sample of the extremum since the start; (m,) sample at which it is
-    known; (m,) offset of the parabola through the three samples around it, within ±0.5 samples.
+    (m,) kind 0 = TC, 1 = IC; (m,) sample of the extremum since the start; (m,) sample of detection; (m,)
+    sub-sample offset from a parabola through three samples, within ±0.5.
     """
     room = 2 * (len(s) // (state.window + 1) + 1)
     kind, index, known = (np.empty(room, np.int64) for _ in range(3))
@@ -118,11 +120,13 @@ def advance_foot_pitch(
 
 
 def pitch_signal(q_foot: Floats) -> Floats:
-    """s (n,) of foot orientations (n, 4): sine of the foot's pitch, toes up positive (thesis Eq 52)."""
+    """Pitch signal s (n,) of foot orientations (n, 4): sine of the foot's pitch, toes up positive (thesis
+    Eq 52).
+    """
     w, x, y, z = q_foot[:, 0], q_foot[:, 1], q_foot[:, 2], q_foot[:, 3]
     return np.asarray(2.0 * (x * z - w * y))
 
 
 def compile_foot_pitch_kernel() -> None:
-    """Compile (or load from the cache) the kernel, so that the first analysis does not wait for it."""
+    """Compile the kernel or load it from the cache, so that the first analysis is not delayed."""
     advance_foot_pitch(FootPitchState.start(100.0, FootPitchParams()), np.zeros(1), np.ones(1, np.bool_))

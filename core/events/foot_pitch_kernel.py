@@ -1,4 +1,4 @@
-"""The compiled part of the foot-pitch rule (docs/science/events.md); foot_pitch.py explains it."""
+"""Compiled foot-pitch rule (docs/science/events.md); explained in foot_pitch.py."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numba import njit
 def foot_pitch_kernel(  # type: ignore[no-untyped-def]
     s, valid, ring, counters, held, window, need, threshold, fall, kind, index, known, offset
 ):
-    """Run over a block of one foot; returns how many extrema were found.
+    """Process a block of one foot; returns the number of extrema.
 
     Parameters
     ----------
     s, valid : (n,) float64, bool. ring, counters, held, window, need, threshold, fall : see FootPitchState;
-        the first three are advanced in place. kind, index, known, offset : room for the results: 0 = TC or
-        1 = IC, sample since the start, sample at which it is known, sub-sample offset.
+        the first three are advanced in place. kind, index, known, offset : output arrays: 0 = TC or 1 = IC,
+        sample since the start, sample of detection, sub-sample offset.
     """
     size = window + 3
     found = 0

@@ -1,11 +1,10 @@
-"""Contacts from the sagittal angular rate of foot or shank: one detector, its rules chosen by parameters.
+"""Contacts from the sagittal angular rate of foot or shank: one detector with configurable rules.
 
-Every swing is a peak of the rate (forward positive). After it the segment slows down, its rate passes zero
-and has a negative peak: one of the two is the initial contact. Before it, while the heel rises, the rate has
-its deepest minimum: the terminal contact. The published detectors differ in segment, feature, waiting times
-and threshold. Their full rules are not openly readable; the presets put together what is public of them
-(docs/science/events.md, "Presets") and are called reconstructions: figures of theirs are not figures of the
-papers.
+Every swing is a peak of the rate (forward positive). After it the segment slows down, its rate crosses zero
+and has a negative peak: one of the two is the initial contact. Before it, during heel rise, the rate has its
+deepest minimum: the terminal contact. The published detectors differ in segment, feature, waiting times and
+threshold. Their full rules are not openly available; the presets combine what is published
+(docs/science/events.md, "Presets") and are called reconstructions: their results are not those of the papers.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ import numpy as np
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.events.result import GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SHANK, SIDES, Bools, Floats, Oriented, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import conjugate, log, multiply
 from sagittal.core.signals.filtering import low_pass
@@ -37,19 +37,20 @@ class GyroPeakParams:
     Parameters
     ----------
     name : source of its events.
-    segment : which segment's rate.
-    contact : "zero_cross" = the rate passes zero after the swing, "neg_peak" = the deepest minimum of the
+    segment : segment whose rate is used.
+    contact : "zero_cross" = the rate passes zero after the swing, "neg_peak" = the deepest minimum within
         `contact_s` after that.
     leaving : "before_swing" = the last minimum before the swing, "deepest" = the deepest between contact and
         swing; both after the waiting time and at least `leaving_rad_s` deep.
-    swing_rad_s : least peak of a swing. refractory_s : least time between two swings.
-    unclear : share of the threshold, and of the swings: so many peaks between that share and the threshold
-        make a foot's swings unclear, and none of them is reported. Our choice: in the severe simulated
-        shuffle half of the swings of the foot exceed the threshold. apart_s : distance of two swings for it.
-    wait_s : from a contact to the terminal contact that may follow it.
-    low_pass_hz : zero-phase low-pass of the rate, None = as it is.
-    longest_s : from swing peak to contact, and from terminal contact to swing peak. min_rate_hz : as the
-        foot-pitch rule's.
+    swing_rad_s : minimum peak of a swing. refractory_s : minimum time between two swings.
+    unclear : fraction of the threshold, and of the swings: with this fraction of peaks between the lower
+        limit and the threshold the swings of a foot are unclear, and none is reported. Our choice: in the
+        severe simulated shuffle half of the swings of the foot exceed the threshold. apart_s : minimum
+        distance of two swings for this check.
+    wait_s : minimum time from a contact to the following terminal contact.
+    low_pass_hz : zero-phase low-pass of the rate, None = unfiltered.
+    longest_s : from swing peak to contact, and from terminal contact to swing peak. min_rate_hz : as for the
+        foot-pitch rule.
     """
 
     name: str = "gyro_peaks"
@@ -106,7 +107,7 @@ LIMB: Final[Mapping[str, Mapping[Side, Segment]]] = MappingProxyType({"foot": FO
 
 
 def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | None = None) -> GaitEvents:
-    """Contacts of every side that carries the segment's sensor.
+    """Contacts of every side with a sensor on the segment.
 
     Parameters
     ----------
@@ -114,8 +115,8 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
 
     Returns
     -------
-    events in order of time; `detected_s` is when the rule knows. Notices: `segment_missing`, `no_swing`,
-    `swing_unclear`.
+    Events in chronological order; `detected_s` is the time of detection. Notices: `segment_missing`,
+    `no_swing`, `swing_unclear`.
 
     Raises
     ------
@@ -125,15 +126,24 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
     if rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Gait events need at least {params.min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. Record"
-            " at a higher rate.",
+            Message(
+                "Gait events need at least {min_rate_hz:g} Hz, the recording has {rate_hz:g} Hz. "
+                "Record at a higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate_hz=rate_hz,
+            ),
         )
     events: list[GaitEvent] = []
     notices: list[Notice] = []
     for side in SIDES:
         segment = LIMB[params.segment][side]
         if segment not in take.q or not take.valid[segment].any():
-            message = f"No sensor on the {side} {params.segment}: {params.name} finds no contacts of it."
+            message = Message(
+                "No sensor on the {side} {segment}: {name} finds no contacts of it.",
+                side=side,
+                segment=params.segment,
+                name=params.name,
+            )
             notices.append(Notice("segment_missing", message, segment))
             continue
         rate = sagittal_rate(take.q[segment], rate_hz)
@@ -150,9 +160,15 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
             notices.append(
                 Notice(
                     "no_swing",
-                    f"The {side} {params.segment} never swung faster than"
-                    f" {np.degrees(params.swing_rad_s):.0f}°/s (fastest was {top:.0f}°/s), so {params.name}"
-                    " found no contacts on it.",
+                    Message(
+                        "The {side} {segment} never swung faster than {swing_rad_s:.0f}°/s (fastest was "
+                        "{top:.0f}°/s), so {name} found no contacts on it.",
+                        side=side,
+                        segment=params.segment,
+                        swing_rad_s=np.degrees(params.swing_rad_s),
+                        top=top,
+                        name=params.name,
+                    ),
                     segment,
                 )
             )
@@ -161,7 +177,7 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
 
 
 def sagittal_rate(q: Floats, rate_hz: float) -> Floats:
-    """Angular rate (n,) in rad/s about the segment's own rightward axis: the lower end forward positive."""
+    """Angular rate (n,) in rad/s about the segment's medio-lateral axis: the distal end forward positive."""
     step = compare_neighbours(q, lambda a, b: log(multiply(conjugate(a), b))[:, 2] * rate_hz)
     return np.append(step, step[-1:] if len(step) else 0.0)
 
@@ -195,11 +211,11 @@ def _events(
 
 
 class _Course:
-    """A rate (n,) with what is asked of it at every swing, found once.
+    """A rate (n,) with features precomputed for all swings.
 
     Parameters
     ----------
-    valid : (n,) sensor there.
+    valid : (n,) sensor data available.
     """
 
     def __init__(self, rate: Floats, valid: Bools) -> None:
@@ -209,12 +225,12 @@ class _Course:
         self._lost: list[int] = np.flatnonzero(~valid).tolist()
 
     def find_lows(self, start: int, end: int) -> list[int]:
-        """Local minima between two samples, neither of which can be one."""
+        """Local minima strictly between two samples."""
         lows = self._lows
         return lows[bisect_right(lows, start) : bisect_left(lows, end - 1)]
 
     def find_below(self, start: int, end: int) -> int | None:
-        """The first sample from `start` on, before `end`, at which the segment does not go forwards."""
+        """The first sample from `start` on, before `end`, without forward rotation of the segment."""
         at = bisect_left(self._below, start)
         return self._below[at] if at < len(self._below) and self._below[at] < end else None
 
@@ -224,14 +240,14 @@ class _Course:
         return at == len(self._lost) or self._lost[at] > last
 
     def find_deepest(self, samples: list[int]) -> int:
-        """The lowest of some samples, of equals the first."""
+        """The lowest of some samples, the first if equal."""
         return min(samples, key=self.rate.__getitem__)
 
 
 def _contact(
     course: _Course, swing: int, end: int, rate_hz: float, params: GyroPeakParams
 ) -> tuple[float, int] | None:
-    """Sample (fractional) of the contact after a swing, and the sample at which it is known."""
+    """Sample (fractional) of the contact after a swing, and the sample of its detection."""
     rate, after = course.rate, course.find_below(swing, end)
     if after is None:
         return None
@@ -245,7 +261,7 @@ def _contact(
 
 
 def _unclear(rate: Floats, rate_hz: float, params: GyroPeakParams) -> tuple[int, int] | None:
-    """Number of peaks just below the threshold and above it, where that leaves the swings unclear."""
+    """Number of peaks just below and above the threshold, if they make the swings unclear."""
     share, most = params.unclear
     low = share * params.swing_rad_s
     # a swing may have a smaller peak beside its own: only what stands for itself counts
@@ -262,17 +278,33 @@ def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: G
         "swing_unclear",
         plural(
             found[0],
-            f"{found[0]} swing of the {side} {params.segment} stays just below {limit}°/s and {found[1]}"
-            f" exceed it: {params.name} would miss many contacts, so it reports none.",
-            f"{found[0]} swings of the {side} {params.segment} stay just below {limit}°/s and {found[1]}"
-            f" exceed it: {params.name} would miss many contacts, so it reports none.",
+            Message(
+                "{found} swing of the {side} {segment} stays just below {limit}°/s and {found2} "
+                "exceed it: {name} would miss many contacts, so it reports none.",
+                found=found[0],
+                side=side,
+                segment=params.segment,
+                limit=limit,
+                found2=found[1],
+                name=params.name,
+            ),
+            Message(
+                "{found} swings of the {side} {segment} stay just below {limit}°/s and {found2} "
+                "exceed it: {name} would miss many contacts, so it reports none.",
+                found=found[0],
+                side=side,
+                segment=params.segment,
+                limit=limit,
+                found2=found[1],
+                name=params.name,
+            ),
         ),
         segment,
     )
 
 
 def _leaving(course: _Course, start: int, swing: int, params: GyroPeakParams) -> int | None:
-    """Sample of the minimum before a swing, None if there is none deep enough."""
+    """Sample of the minimum before a swing, None without a sufficiently deep one."""
     lows = [k for k in course.find_lows(start, swing) if course.rate[k] <= -params.leaving_rad_s]
     if not lows:
         return None
@@ -280,12 +312,12 @@ def _leaving(course: _Course, start: int, swing: int, params: GyroPeakParams) ->
 
 
 def _minima(x: Floats) -> np.ndarray:
-    """Places of the local minima of x (n,), ends excluded."""
+    """Indices of the local minima of x (n,), ends excluded."""
     return np.flatnonzero((x[1:-1] < x[:-2]) & (x[1:-1] <= x[2:])) + 1
 
 
 def _vertex(x: Floats, i: int) -> float:
-    """Where between the samples the extremum at i is, within ±0.5: a parabola through three of them."""
+    """Sub-sample offset of the extremum at i, within ±0.5: a parabola through three samples."""
     before, at, after = x[i - 1 : i + 2].tolist()
     bend = before - 2.0 * at + after
     return 0.0 if bend == 0.0 else float(min(max(0.5 * (before - after) / bend, -0.5), 0.5))

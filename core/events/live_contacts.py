@@ -1,7 +1,8 @@
-"""Contacts of the feet as samples come, told in the push in which they are known.
+"""Streaming contact detection, reported in the push in which contacts become known.
 
-The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is told
-at once, and again when its refined time is known; a foot-off again where its landing shows that it was none.
+The rules of core/events/foot_contact.py; they need neither heading nor the other sensors. A contact is
+reported at once, and again when its refined time is available; a foot-off again if its landing shows that it
+was none.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ from sagittal.core.events.foot_pitch import FootPitchParams
 from sagittal.core.events.foot_way import FootWayParams
 from sagittal.core.events.live_foot import KnownContact, LiveFoot
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 
 
 class ContactDetector:
-    """Initial and terminal contacts of the feet that carry a sensor.
+    """Initial and terminal contacts of the feet with a sensor.
 
     Raises
     ------
@@ -37,7 +39,11 @@ class ContactDetector:
         if rate_hz < pitch.min_rate_hz:
             raise SignalError(
                 "sample_rate_too_low",
-                f"Gait events need at least {pitch.min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                Message(
+                    "Gait events need at least {min_rate_hz:g} Hz, the sensors send {rate_hz:g} Hz.",
+                    min_rate_hz=pitch.min_rate_hz,
+                    rate_hz=rate_hz,
+                ),
             )
         sides = (s for f in feet for s in SIDES if FOOT[s] == f)
         self._feet = [LiveFoot(side, rate_hz, pitch, params, ways) for side in sides]
@@ -46,12 +52,12 @@ class ContactDetector:
     def push(
         self, q: Floats, valid: Bools, motions: Sequence[FootMovement], first: int
     ) -> list[KnownContact]:
-        """Contacts that these samples make known, in the order in which they become known.
+        """Contacts that become known with these samples, in the order of detection.
 
         Parameters
         ----------
-        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples.
-        first : the chain's first sample on the axis.
+        q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples. first :
+            first sample of the chain on the axis.
         """
         found = []
         for i, foot in enumerate(self._feet):

@@ -1,14 +1,14 @@
-"""Steps from one sensor on the trunk: lower back, sacrum or chest, mounted anyhow.
+"""Steps from one sensor on the trunk: lower back, sacrum or chest, in any orientation.
 
-The trunk is lowest, and its vertical acceleration highest, while both feet carry it: the maxima of the
-smoothed vertical acceleration stand 20 to 70 ms after the initial contacts (mobgap_lowback). With the scale
-of a Gaussian this is the differentiated vertical velocity of McCamley et al. 2012 (Gait & Posture 36:316).
-Ours is what makes it safe: scale and least distance of the maxima follow the step time that the whole
-movement repeats with (core/events/periodicity.py), since a slow walk has two maxima a step, and where nothing
-repeats no step is reported.
+The trunk is lowest, and its vertical acceleration highest, in double support: the maxima of the smoothed
+vertical acceleration are 20 to 70 ms after the initial contacts (mobgap_lowback). With a Gaussian kernel this
+is the differentiated vertical velocity of McCamley et al. 2012 (Gait & Posture 36:316). Our addition makes it
+robust: kernel width and minimum distance of the maxima follow the step time with which the whole movement
+repeats (core/events/periodicity.py), because slow walking has two maxima per step, and without a periodicity
+no step is reported.
 
-Which foot landed: the pelvis turns towards the side that is in front, so its yaw alternates between the
-contacts. A thorax turns against or with the pelvis, depending on speed: the chest tells no side.
+Side of the step: the pelvis rotates towards the side in front, so its yaw alternates between the contacts. A
+thorax rotates against or with the pelvis, depending on speed: a chest sensor cannot determine the side.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from sagittal.core.events.bouts import Bout, BoutParams, RowParams, plain_bouts,
 from sagittal.core.events.periodicity import Periodicity, PeriodicityParams, step_times
 from sagittal.core.events.steps import Step, Steps
 from sagittal.core.frames import Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.filtering import low_pass, smooth_gaussian
@@ -36,26 +37,27 @@ TRUNK: Final[tuple[Segment, ...]] = ("pelvis", "chest")
 
 @dataclass(frozen=True)
 class StepTimeParams:
-    """Parameters of when a trunk makes steps.
+    """Parameters of step detection at the trunk.
 
     Parameters
     ----------
-    scale : σ of the Gaussian as share of the step time: 64 ms at the 0.6 s of mobgap_lowback Test5.
-    prominence : least height of a maximum above its surroundings, m/s². Our choice: standing has 0.1, the
-        severest simulated shuffle 1; between 0.15 and 0.4 mobgap_lowback gives the same (F1 0.94 to 0.95).
-    apart : least distance of two steps as share of the step time. Our choice: the shorter step of a limp of
-        1 : 1.7 (the worst virtual patient has 1 : 1.4) and the longest gap between two maxima of one step.
-    up_s : σ of the Gaussian over which specific force is averaged to find up: several steps.
-    moving : std of the vertical acceleration over 1 s above which somebody moves, m/s². Our choice: standing
-        has at most 0.07 (core/calibration/walking.py).
-    merge_s : pauses shorter than this do not divide the take into parts of their own step time.
-    step_s : step times that count as walking.
-    row_steps : maxima that stand together; fewer are a shift of weight or a push from outside. Our choice: a
-        stride, three contacts.
-    bout_score : least mean score of a bout in a take that has walking somewhere. Our choice: noise has 0.2,
-        daily life with turns and stops (mobgap_lowback Test11) at least 0.29. Slow and irregular walking has
-        down to 0.20, but so have sitting down and bowing (qmt_fullbody).
-    min_rate_hz : our choice: the shortest step in which maxima are looked for has five samples.
+    scale : σ of the Gaussian as a fraction of the step time: 64 ms at the 0.6 s of mobgap_lowback Test5.
+    prominence : minimum prominence of a maximum, m/s². Our choice: standing has 0.1, the most severe
+        simulated shuffle 1; values between 0.15 and 0.4 are equivalent on mobgap_lowback (F1 0.94 to 0.95).
+    apart : minimum distance of two steps as a fraction of the step time. Our choice: the shorter step of a
+        limp of 1 : 1.7 (the worst simulated patient has 1 : 1.4) and the longest gap between two maxima of
+        one step.
+    up_s : σ of the Gaussian for averaging specific force to find the vertical: several steps.
+    moving : std of the vertical acceleration over 1 s that indicates movement, m/s². Our choice: standing has
+        at most 0.07 (core/calibration/walking.py).
+    merge_s : shorter pauses do not divide the recording into parts with separate step times.
+    step_s : range of step times in walking.
+    row_steps : minimum number of consecutive maxima; fewer are a shift of weight or an external push. Our
+        choice: a stride, three contacts.
+    bout_score : minimum mean score of a bout in a recording with walking. Our choice: noise has 0.2, daily
+        life with turns and stops (mobgap_lowback Test11) at least 0.29. Slow and irregular walking has down
+        to 0.20, but so do sitting down and bowing (qmt_fullbody).
+    min_rate_hz : our choice: five samples in the shortest step.
     """
 
     scale: float = 0.107
@@ -74,17 +76,18 @@ class StepTimeParams:
 
 @dataclass(frozen=True)
 class LumbarParams(StepTimeParams):
-    """And of which foot makes them.
+    """Parameters of step detection with sides.
 
     Parameters
     ----------
-    side_share, side_steps : agreement of the alternating yaw (0 to 1) and number of steps without a break
-        from which sides are told. Our choice.
-    side_rad : least mean of the alternating yaw in a straight part that is judged by itself. In two of the
-        four people of ipol_walks it alternates by 1.2° and less, in one of them the other way round.
-    side_reach : steps at the ends of a walk that are told with the straight part beside them. Our choice.
-    turning_rad_s : yaw rate below 0.5 Hz from which the body turns, and its swing cannot be told from that.
-        Our choice: that of a turn (core/events/turns.py).
+    side_share, side_steps : minimum agreement of the alternating yaw (0 to 1) and minimum number of steps
+        without a break to assign sides. Our choice.
+    side_rad : minimum mean of the alternating yaw in a straight part judged separately. In two of the four
+        people of ipol_walks it alternates by at most 1.2°, in one of them with the opposite sign.
+    side_reach : number of steps at the ends of a walk that are assigned along with the adjacent straight
+        part. Our choice.
+    turning_rad_s : yaw rate below 0.5 Hz that indicates a turn, in which the pelvic rotation cannot be
+        separated. Our choice: that of a turn (core/events/turns.py).
     """
 
     bouts: BoutParams = field(default_factory=BoutParams)
@@ -96,12 +99,12 @@ class LumbarParams(StepTimeParams):
 
 
 def trunk_sensor(recording: UniformRecording) -> Segment | None:
-    """The sensor steps can be read from, the lower back before the chest."""
+    """The trunk sensor to use, the lower back before the chest."""
     return next((s for s in TRUNK if s in recording.sensors), None)
 
 
 def detect_steps(recording: UniformRecording, params: LumbarParams | None = None) -> Steps:
-    """Steps, their feet where they can be told, and walking bouts of a take with a trunk sensor.
+    """Steps, their sides where determined, and walking bouts of a recording with a trunk sensor.
 
     Parameters
     ----------
@@ -110,8 +113,8 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
 
     Returns
     -------
-    steps inside walking bouts; the notice `no_walking` (nobody moved), `non_periodic` (movement without a
-    rhythm of steps) or `few_steps` (no bout) says why there are none.
+    Steps inside walking bouts; without any, a notice `no_walking` (no movement), `non_periodic` (movement
+    without a step rhythm) or `few_steps` (no bout).
 
     Raises
     ------
@@ -137,9 +140,12 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
         return _nothing(
             segment,
             "few_steps",
-            f"{len(times)} {plural(len(times), 'step was', 'steps were')} found, nowhere "
-            f"{params.bouts.min_strides + 2} without a break: no walking bout is reported. "
-            "Record a longer walk.",
+            Message(
+                f"{{times}} {plural(len(times), 'step was', 'steps were')} found, nowhere {{min_strides}} "
+                "without a break: no walking bout is reported. Record a longer walk.",
+                times=len(times),
+                min_strides=params.bouts.min_strides + 2,
+            ),
         )
     steps = [
         step
@@ -154,7 +160,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
 def _tell_feet(
     run: list[float], segment: Segment, yaw_rate: Floats, step_s: float, rate_hz: float, params: LumbarParams
 ) -> list[Step]:
-    """The steps of an unbroken run with their feet, which only the pelvis tells."""
+    """The steps of an unbroken run with their sides, which only a pelvis sensor determines."""
     sides: list[Side | None] = [None] * len(run)
     if segment == "pelvis":
         sides = _sides(run, yaw_rate, step_s, rate_hz, params)
@@ -177,7 +183,7 @@ def _tell_unknown_sides(steps: list[Step], segment: Segment) -> tuple[Notice, ..
 
 
 def find_step_times(recording: UniformRecording, segment: Segment, params: StepTimeParams) -> list[float]:
-    """Times of the steps that `detect_steps` finds of a sensor, whose feet and stops nobody asks for.
+    """Step times of a sensor as in `detect_steps`, without sides and stops.
 
     Raises
     ------
@@ -194,13 +200,17 @@ def find_step_times(recording: UniformRecording, segment: Segment, params: StepT
 def _find_rows(
     recording: UniformRecording, segment: Segment, params: StepTimeParams
 ) -> Steps | tuple[list[float], Periodicity, Floats]:
-    """Times of steps in rows, s, their rhythm and the yaw rate, rad/s; why there are none."""
+    """Times of consecutive steps, s, their rhythm and the yaw rate, rad/s; or empty steps with the reason."""
     rate = recording.rate_hz
     if rate < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Steps need at least {params.min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a"
-            " higher rate.",
+            Message(
+                "Steps need at least {min_rate_hz:g} Hz, the recording has {rate:g} Hz. Record at a "
+                "higher rate.",
+                min_rate_hz=params.min_rate_hz,
+                rate=rate,
+            ),
             sensor=segment,
         )
     signals = recording.sensors[segment]
@@ -218,9 +228,13 @@ def _find_rows(
         return _nothing(
             segment,
             "non_periodic",
-            f"The movement of the trunk has no rhythm of steps (best score {rhythm.score.max():.2f}; needed"
-            f" for several seconds: {params.periodicity.row_score:g}): no steps are reported. Record at least"
-            " ten steps straight ahead.",
+            Message(
+                "The movement of the trunk has no rhythm of steps (best score {max:.2f}; needed for "
+                "several seconds: {row_score:g}): no steps are reported. Record at least ten steps "
+                "straight ahead.",
+                max=rhythm.score.max(),
+                row_score=params.periodicity.row_score,
+            ),
         )
     return _steps(vertical, moving, rhythm, rate, params), rhythm, yaw_rate
 
@@ -228,9 +242,9 @@ def _find_rows(
 def split_about_vertical(
     signals: SensorSignals, rate_hz: float, params: StepTimeParams | None = None
 ) -> tuple[Floats, Floats]:
-    """Vertical acceleration free of gravity (n,) in m/s² and yaw rate (n,) in rad/s, left positive.
+    """Gravity-free vertical acceleration (n,) in m/s² and yaw rate (n,) in rad/s, left positive.
 
-    Up is where the specific force points on average over several steps: an upright trunk needs no filter.
+    Up is the mean direction of the specific force over several steps: an upright trunk needs no filter.
     """
     return _split_along(signals, *_mean_up(signals, rate_hz, params or StepTimeParams()))
 
@@ -240,14 +254,14 @@ def _split_along(signals: SensorSignals, up: Floats, norm: Floats) -> tuple[Floa
 
 
 def _mean_up(signals: SensorSignals, rate_hz: float, params: StepTimeParams) -> tuple[Floats, Floats]:
-    """Where up is (n, 3), sensor axes, and the mean specific force (n,) along it, m/s²."""
+    """Up direction (n, 3) in sensor axes, and the mean specific force (n,) along it, m/s²."""
     force = np.stack([smooth_gaussian(a, params.up_s * rate_hz) for a in signals.acc.T], axis=1)
     norm = np.maximum(find_lengths(force), 1e-9)
     return force / norm[:, None], norm
 
 
 def find_moving(vertical: Floats, valid: Bools, rate_hz: float, params: StepTimeParams) -> Bools:
-    """Samples at which the trunk moves vertically as in walking and the sensor is there."""
+    """Samples with walking-like vertical movement of the trunk and sensor data available."""
     from scipy.ndimage import uniform_filter1d
 
     width = max(2, round(rate_hz))
@@ -265,7 +279,7 @@ def _good(rhythm: Periodicity, params: StepTimeParams) -> Bools:
 def _steps(
     vertical: Floats, moving: Bools, rhythm: Periodicity, rate_hz: float, params: StepTimeParams
 ) -> list[float]:
-    """Times of the maxima of every moving part, at the scale of its own step time."""
+    """Times of the maxima in every moving part, with a kernel for the step time of that part."""
     good = _good(rhythm, params)
     usual = float(np.median(rhythm.step_s[good]))
     times: list[float] = []
@@ -283,14 +297,14 @@ def _steps(
 
 
 def _repeats(bout: Bout, rhythm: Periodicity, params: StepTimeParams) -> bool:
-    """Is there enough of a rhythm in a bout?"""
+    """Whether a bout is sufficiently periodic."""
     reach = 0.5 * params.periodicity.hop_s
     here = (rhythm.t_s >= bout.start_s - reach) & (rhythm.t_s <= bout.end_s + reach)
     return bool(here.any() and rhythm.score[here].mean() >= params.bout_score)
 
 
 def _parts(moving: Bools, merge: float) -> list[tuple[int, int]]:
-    """Runs of movement, those closer than `merge` samples joined."""
+    """Runs of movement, merged if closer than `merge` samples."""
     parts: list[tuple[int, int]] = []
     for first, end in find_runs(moving):
         if parts and first - parts[-1][1] < merge:
@@ -301,13 +315,13 @@ def _parts(moving: Bools, merge: float) -> list[tuple[int, int]]:
 
 
 def _offset(x: Floats, i: int) -> float:
-    """Where between the samples the maximum is, within ±0.5: a parabola through three of them."""
+    """Sub-sample offset of the maximum, within ±0.5: a parabola through three samples."""
     bend = x[i - 1] - 2.0 * x[i] + x[i + 1]
     return 0.0 if bend >= 0.0 else float(0.5 * (x[i - 1] - x[i + 1]) / bend)
 
 
 def _together(times: list[float], longest: float, least: int) -> list[float]:
-    """Times that stand in a row of at least `least`, none further than `longest` from the next."""
+    """Times in a row of at least `least`, with gaps of at most `longest`."""
     kept: list[float] = []
     row: list[float] = []
     for t in times:
@@ -332,13 +346,13 @@ def _unbroken(times: list[float], bout: Bout) -> list[list[float]]:
 def _sides(
     times: list[float], yaw_rate: Floats, step_s: float, rate_hz: float, params: LumbarParams
 ) -> list[Side | None]:
-    """Foot of each step, None where the yaw does not tell.
+    """Side of each step, None where the yaw is inconclusive.
 
-    The yaw about its mean over a stride is left (positive) when the right foot is in front, and most so about
-    an eighth of a stride after the contact: between the simulator's pelvis (at the contact) and real ones
-    (0.1 to 0.2 s after it on mobgap_lowback and neura_walk). In a turn it says nothing and a step is easily
-    missed: where the whole does not agree, every straight part is judged by itself, and steps of a turn are
-    told where the parts beside it agree.
+    The yaw relative to its mean over a stride is left (positive) when the right foot is in front, with its
+    maximum about an eighth of a stride after the contact: between the simulator's pelvis (at the contact) and
+    real ones (0.1 to 0.2 s after it in mobgap_lowback and neura_walk). In a turn it is meaningless and a step
+    is easily missed: if the whole walk is inconsistent, every straight part is judged separately, and steps
+    in a turn are assigned if the adjacent parts agree.
     """
     from scipy.ndimage import uniform_filter1d
 

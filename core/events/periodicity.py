@@ -1,20 +1,20 @@
-"""The step time of a walking trunk, from how its movement repeats.
+"""Step time of a walking trunk from the periodicity of its movement.
 
-What the trunk does vertically repeats with every step; its angular velocity repeats with every stride, and
-half a stride later roll and yaw are reversed. The lag T at which all of this holds at once is the step time:
+The vertical movement of the trunk repeats with every step; its angular velocity repeats with every stride,
+with roll and yaw reversed half a stride later. The lag T at which all of this holds at once is the step time:
 
     score(T) = ¼ (r_a(T) + r_a(2T) + r_ω(2T) − r_ω(T))
 
 with r the normalised autocorrelation of vertical acceleration (a) and of angular velocity as a vector (ω),
-which no mounting of the sensor changes. Without a gyroscope the horizontal acceleration (h) takes its place,
-which repeats with every stride whatever its share from side to side:
+which is independent of the orientation of the sensor. Without a gyroscope the horizontal acceleration (h)
+takes its place, which repeats with every stride whatever its lateral component:
 
     score(T) = ⅓ (r_a(T) + r_a(2T) + r_h(2T))
 
-Step and stride regularity of the vertical acceleration alone
-(Moe-Nilssen & Helbostad 2004, J Biomech 37:121) tell neither half nor double the step time apart: a slow walk
-has two peaks a step. The four terms together are our choice; on the simulated people (tests) they give the
-step time where the acceleration alone fails.
+Step and stride regularity of the vertical acceleration alone (Moe-Nilssen & Helbostad 2004, J Biomech 37:121)
+cannot exclude half or double the step time: slow walking has two peaks per step. The combination of the four
+terms is our choice; on the simulated people (tests) it gives the step time where the acceleration alone
+fails.
 """
 
 from __future__ import annotations
@@ -35,20 +35,21 @@ TOGETHER: Final = 64
 
 @dataclass(frozen=True)
 class PeriodicityParams:
-    """How the step time is looked for.
+    """Search for the step time.
 
     Parameters
     ----------
-    window_s, hop_s : length and distance of the windows: three strides of a slow walk, one step further.
-    shortest_s, longest_s : lags that are tried; the shortest are no steps, but must be tried so that a
-        rhythm too quick to be followed is not taken for one half as quick.
-    least : score from which the step time of a window is believed. row, row_score, row_spread : so many
-        successive windows must reach this mean score with step times this close to their median before a take
-        is called walking at all. Our choice: coloured noise of any bandwidth exceeds 0.4 in 5 % of the
-        windows and a mean of 0.45 in 1 % of the rows; people of mobgap_lowback and neura_walk reach rows of
-        0.6 to 0.7, the simulated ones 0.5 (hemiparesis) to 0.97.
-    nearly : the shortest lag that reaches this share of the best is taken: its odd multiples score the same.
-    smooth_s, slow_s : σ of the Gaussians that take off noise, and turns and leaning, first.
+    window_s, hop_s : length and spacing of the windows: three strides of a slow walk, one step.
+    shortest_s, longest_s : range of lags; the shortest are no steps, but are included so that a rhythm too
+        fast to be resolved is not mistaken for one half as fast.
+    least : minimum score to accept the step time of a window. row, row_score, row_spread : number of
+        consecutive windows, their mean score, and maximum deviation of step times from their median required
+        for walking. Our choice: coloured noise of any bandwidth exceeds 0.4 in 5 % of the windows and a mean
+        of 0.45 in 1 % of the rows; people in mobgap_lowback and neura_walk reach rows of 0.6 to 0.7, the
+        simulated ones 0.5 (hemiparesis) to 0.97.
+    nearly : the shortest lag that reaches this fraction of the best score is used: odd multiples have equal
+        scores.
+    smooth_s, slow_s : σ of the Gaussians that remove noise, and turns and leaning, beforehand.
     """
 
     window_s: float = 4.0
@@ -66,11 +67,11 @@ class PeriodicityParams:
 
 @dataclass(frozen=True, eq=False)
 class Periodicity:
-    """Step time along a take.
+    """Step time along a recording.
 
     Parameters
     ----------
-    t_s : (w,) middles of the windows. step_s : (w,) best lag, NaN without any. score : (w,) −1 to 1.
+    t_s : (w,) centres of the windows. step_s : (w,) best lag, NaN without any. score : (w,) −1 to 1.
     """
 
     t_s: Floats
@@ -78,7 +79,7 @@ class Periodicity:
     score: Floats
 
     def walks(self, step_s: tuple[float, float], params: PeriodicityParams) -> bool:
-        """Does any row of windows repeat like walking, with a step time in the range?"""
+        """Whether any row of windows is periodic like walking, with a step time in the range."""
         for i in range(len(self.score) - min(params.row, len(self.score)) + 1):
             steps, score = self.step_s[i : i + params.row], self.score[i : i + params.row]
             middle = float(np.median(steps))
@@ -95,12 +96,12 @@ def step_times(
     params: PeriodicityParams | None = None,
     horizontal: Floats | None = None,
 ) -> Periodicity:
-    """Step time in windows along a take.
+    """Step time in windows along a recording.
 
     Parameters
     ----------
-    vertical : (n,) m/s². gyr : (n, 3) rad/s, any mounting; None without a gyroscope, then
-    horizontal : (n, 3) the rest of the acceleration, m/s².
+    vertical : (n,) m/s². gyr : (n, 3) rad/s, in any orientation; None without a gyroscope, which requires
+        horizontal : (n, 3) horizontal acceleration, m/s².
     """
     params = params or PeriodicityParams()
     second = horizontal if gyr is None else gyr
@@ -125,7 +126,7 @@ def step_times(
 
 
 def _list_lags(width: int, rate_hz: float, params: PeriodicityParams) -> NDArray[np.int64]:
-    """Step times that are tried in windows of so many samples, in samples."""
+    """Candidate step times for windows of this length, in samples."""
     first = max(2, round(params.shortest_s * rate_hz))
     last = min(round(params.longest_s * rate_hz), round(0.375 * width))
     return np.arange(first, last + 1)
@@ -142,9 +143,9 @@ def _score_lags(a: Floats, w: Floats, lag: NDArray[np.int64], *, turns: bool) ->
 
 
 def _choose(score: Floats, nearly: float) -> NDArray[np.int64]:
-    """Place (k,) of the shortest lag among the maxima of each score (k, lags) that is nearly the best.
+    """Index (k,) of the shortest lag among the maxima of each score (k, lags) that is nearly the best.
 
-    −1 where no maximum is above 0.
+    −1 if no maximum is above 0.
     """
     top = (score[:, 1:-1] >= score[:, :-2]) & (score[:, 1:-1] > score[:, 2:])
     height = np.where(top, score[:, 1:-1], -np.inf)
@@ -154,17 +155,17 @@ def _choose(score: Floats, nearly: float) -> NDArray[np.int64]:
 
 
 def _between(x: Floats, rate_hz: float, params: PeriodicityParams) -> Floats:
-    """x (c, n) without what is quicker or slower than steps."""
+    """Signals x (c, n) band-passed to the range of steps."""
     quick, slow = params.smooth_s * rate_hz, params.slow_s * rate_hz
     return np.array([smooth_gaussian(row, quick) - smooth_gaussian(row, slow) for row in x])
 
 
 def _autocorrelation(x: Floats, lags: int) -> Floats:
-    """Correlation (k, lags) of windows with themselves later, each lag by the energy of its two parts.
+    """Correlation (k, lags) of windows with themselves shifted, normalised by the energy of the two parts.
 
     Parameters
     ----------
-    x : (c, k, n) components of a vector; of each its mean over the window is taken off.
+    x : (c, k, n) components of a vector; the mean of each over the window is subtracted.
     """
     n = x.shape[-1]
     x = x - x.mean(axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""What event detection gives: contacts with time, and the stride list everything later reads."""
+"""Results of event detection: contacts with times, and the stride list used by all later stages."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class GaitEvent:
 
     Parameters
     ----------
-    time_s : when it happened, seconds from recording start.
-    detected_s : when a real-time detector tells it first.
+    time_s : time of the event, seconds from recording start.
+    detected_s : time of the first report by a real-time detector.
     source : name of the detector ("foot_contact"), "consensus" or "manual".
-    confidence : 0 to 1, share of the detectors that found it (core/events/consensus.py); None = one detector.
-    uncertainty_s : standard uncertainty of `time_s` against the moment a force plate means, s; None where a
-        person placed it or the detector has none. Most of it is the same for all events of a foot.
-    first_s : the time under which a stream told it first, where `time_s` is a later, refined one; else None.
+    confidence : 0 to 1, fraction of detectors that found it (core/events/consensus.py); None = one detector.
+    uncertainty_s : standard uncertainty of `time_s` relative to a force plate, s; None for manual events or
+        if the detector has none. Most of it is common to all events of a foot.
+    first_s : time of the first report in a stream, if `time_s` is a later, refined one; else None.
     """
 
     time_s: float
@@ -64,7 +64,9 @@ class GaitEvent:
     first_s: float | None = None
 
     def rate(self, confidence: float | None) -> GaitEvent:
-        """The same with another confidence; of thousands `replace` takes three times as long."""
+        """The same event with a different confidence; three times faster than `replace`, which matters for
+        thousands.
+        """
         return GaitEvent(
             self.time_s,
             self.side,
@@ -79,7 +81,7 @@ class GaitEvent:
 
 @dataclass(frozen=True, eq=False)
 class GaitEvents:
-    """All events of a take in order of time, and why a side has none."""
+    """All events of a recording in chronological order, and why a side has none."""
 
     events: tuple[GaitEvent, ...]
     notices: tuple[Notice, ...] = ()
@@ -87,14 +89,14 @@ class GaitEvents:
 
     @property
     def contact_uncertainty_s(self) -> float | None:
-        """What the median contact is known to, standard; a person's own do not count; None where unknown."""
+        """Standard uncertainty of the median contact, manual events excluded; None if unknown."""
         known = sorted(
             e.uncertainty_s for e in self.events if e.uncertainty_s is not None and e.source != MANUAL
         )
         return known[len(known) // 2] if known else None
 
     def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
-        """Event times in s of one side and kind, strictly increasing: two events at one moment are one."""
+        """Event times in s of one side and kind, strictly increasing: coincident events are merged."""
         return self._times.get((side, kind), ())
 
     @cached_property
@@ -112,12 +114,12 @@ class Stride:
     Parameters
     ----------
     start_s, end_s : the two initial contacts; [start, end).
-    tc_s : terminal contact between them, None if not found.
-    opposite_tc_s, opposite_ic_s : the other foot's events inside the cycle, None if not found.
+    tc_s : terminal contact between them, None if not detected.
+    opposite_tc_s, opposite_ic_s : the other foot's events inside the cycle, None if not detected.
     turn_rad : heading change of the foot over the stride, left positive; None if not known.
     excluded_reason : None = counted; else one of `flags` or "manual:<text>".
-    flags : all that the rules found, also where the cycle counts: a short walk keeps what is next to a turn,
-        a person may take a cycle in again.
+    flags : all flags, even if the cycle is counted: a short walk retains strides next to a turn, and a cycle
+        may be included manually.
     """
 
     side: Side
@@ -132,7 +134,7 @@ class Stride:
 
     @property
     def excluded_by(self) -> Literal["rule", "person"] | None:
-        """Who set the cycle aside, None if it counts."""
+        """Origin of the exclusion, None if the cycle is counted."""
         if self.excluded_reason is None:
             return None
         return "person" if self.excluded_reason.startswith(MANUAL) else "rule"
@@ -144,7 +146,7 @@ class Stride:
 
 
 def list_known(values: Floats) -> list[float | None]:
-    """The numbers (n,), None where there is none."""
+    """The numbers (n,), with NaN for None."""
     listed: list[float | None] = values.tolist()
     for i in np.flatnonzero(np.isnan(values)).tolist():
         listed[i] = None
@@ -153,12 +155,12 @@ def list_known(values: Floats) -> list[float | None]:
 
 @dataclass(frozen=True, eq=False)
 class StrideColumns:
-    """A stride list by columns (strides,): times and turn as in `Stride`, NaN where not known.
+    """A stride list as columns (strides,): times and turn as in `Stride`, NaN if unknown.
 
     Parameters
     ----------
-    counted : whether the stride counts.
-    of, used : side → places in the list of all its strides, and of those that count, in order.
+    counted : whether the stride is counted. of, used : side → indices of all its strides, and of the counted
+        ones, in order.
     """
 
     start_s: Floats
@@ -179,14 +181,14 @@ class StrideColumns:
 
 @dataclass(frozen=True, eq=False)
 class Strides:
-    """The stride list of a take: the one mechanism every later figure reads."""
+    """The stride list of a recording, from which all later values are computed."""
 
     strides: tuple[Stride, ...]
     notices: tuple[Notice, ...] = ()
 
     @cached_property
     def columns(self) -> StrideColumns:
-        """The list by columns."""
+        """The list as columns."""
         rows = [
             (s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s, s.turn_rad) for s in self.strides
         ]
@@ -208,7 +210,7 @@ class Strides:
         )
 
     def select_used(self, side: Side | None = None) -> tuple[Stride, ...]:
-        """Strides that count, of one side or both."""
+        """Counted strides of one side or both."""
         return tuple(
             s for s in self.strides if s.excluded_reason is None and (side is None or s.side == side)
         )

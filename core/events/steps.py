@@ -1,4 +1,4 @@
-"""What a trunk sensor tells of a walk: steps in time, the foot where it can be told, walking bouts."""
+"""Steps from a trunk sensor: times, sides where determined, and walking bouts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EDGE_STEPS: Final = 2
 
 @dataclass(frozen=True)
 class Step:
-    """One step: the time of its initial contact in s, and the foot that lands, None if it cannot be told."""
+    """One step: the time of its initial contact in s, and the landing side, None if undetermined."""
 
     time_s: float
     side: Side | None
@@ -27,7 +27,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """The steps of a take in order of time; `source` is the sensor they were read from."""
+    """The steps of a recording in chronological order; `source` is the sensor used."""
 
     steps: tuple[Step, ...]
     bouts: tuple[Bout, ...]
@@ -39,7 +39,7 @@ class Steps:
     def step_times_s(self) -> tuple[float, ...]:
         """Times from contact to contact inside the bouts, without breaks.
 
-        The steps of the first and last stride of a bout, where gait starts and stops, are left out as in the
+        The steps of the first and last stride of a bout, where gait starts and stops, are excluded as in the
         stride list.
         """
         inside = [self._times(bout) for bout in self.bouts]

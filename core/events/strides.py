@@ -1,6 +1,6 @@
-"""GaitEvents → Strides: one list with a reason for every cycle that does not count.
+"""GaitEvents → Strides: one list with a reason for every excluded cycle.
 
-Nothing is deleted: later stages and the therapist see every cycle and why it was set aside.
+Nothing is deleted: later stages and the therapist see every cycle and the reason for its exclusion.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.events.flags import StrideParams, decide_exclusions, flag_cycles
 from sagittal.core.events.result import COMPARED, GaitEvents, Stride, StrideFlag, Strides, list_known
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Oriented, Side
+from sagittal.core.message import Message, join_messages
 from sagittal.core.plurals import plural
 from sagittal.core.rotation import wrap_angle, yaw
 
@@ -33,20 +34,20 @@ def stride_list(
     turning: Bools | None = None,
     params: StrideParams | None = None,
 ) -> Strides:
-    """All cycles of both feet in order of time, with the other foot's events and exclusions.
+    """All cycles of both feet in chronological order, with the other foot's events and exclusions.
 
     Parameters
     ----------
-    events : contacts, of a detector or edited by hand.
-    orientations : of the feet: gaps and heading.
-    turning : (n,) mask on the orientations' axis (from the pelvis), None if not known.
+    events : contacts, from a detector or manually edited.
+    orientations : of the feet, for gaps and heading.
+    turning : (n,) mask on the orientations' axis (from the pelvis), None if unknown.
 
     Returns
     -------
-    flags: "gap" (the foot's sensor was lost inside or within `NEAR_S`), "incomplete" (not exactly one
-    terminal contact, or the other foot landed twice: a contact was missed), "implausible_time", "turn",
+    Strides with flags: "gap" (data loss of the foot inside or within `NEAR_S`), "incomplete" (not exactly one
+    terminal contact, or two landings of the other foot: a contact was missed), "implausible_time", "turn",
     "outlier" of the foot's stride times, "first" / "last" of a bout, "near_turn", "non_periodic" (alone);
-    excluded_reason the first of them. The other foot's contacts are None where its sensor was lost as near.
+    excluded_reason is the first of them. The other foot's contacts are None during a data loss of its sensor.
     """
     params = params or StrideParams()
     plain = [
@@ -59,7 +60,7 @@ def stride_list(
 
 
 def count_strides(strides: Sequence[Stride], params: StrideParams) -> Strides:
-    """The list with what its flags decide, and what must be said about what is left."""
+    """Apply the exclusions given by the flags, and add notices about the remaining strides."""
     listed, near_turns = decide_exclusions(strides, params)
     return Strides(tuple(listed), (*_short_walk(listed, near_turns), *_unused(listed)))
 
@@ -71,7 +72,7 @@ def side_strides(
     turning: Bools | None,
     params: StrideParams,
 ) -> list[Stride]:
-    """Cycles of one foot with every reason that needs no neighbours; arguments as of `stride_list`."""
+    """Cycles of one foot with every reason independent of neighbours; arguments as in `stride_list`."""
     other: Side = "right" if side == "left" else "left"
     contacts, leavings = np.array(events.times(side, "ic")), np.array(events.times(side, "tc"))
     n = len(orientations.t_s)
@@ -81,7 +82,9 @@ def side_strides(
     reach = np.searchsorted(orientations.t_s, (contacts[:-1] - NEAR_S, contacts[1:] + NEAR_S))
 
     def is_lost(which: Side) -> Bools:
-        """Whether samples of a foot are missing in each cycle or so near it that a contact may be wrong."""
+        """Whether samples of a foot are missing in each cycle, or so close to it that a contact may be
+        wrong.
+        """
         if FOOT[which] not in orientations.valid:
             return np.zeros(len(first), np.bool_)
         total = _total(~orientations.valid[FOOT[which]])
@@ -124,36 +127,41 @@ def side_strides(
 
 
 def _total(mask: Bools) -> NDArray[np.int64]:
-    """How often a mask (n,) is true before each sample, (n + 1,)."""
+    """Cumulative number of true values of a mask (n,) before each sample, (n + 1,)."""
     return np.concatenate(([0], np.cumsum(mask, dtype=np.int64)))
 
 
 def _inside(times: Floats, after: Floats, before: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """First of increasing times in each open range (after, before), NaN without one; how many are in it."""
+    """First of increasing times in each open range (after, before), NaN without one; and the number in it."""
     first = np.searchsorted(times, after, "right")
     count = np.searchsorted(times, before, "left") - first
     return np.where(count > 0, np.append(times, np.nan)[first], np.nan), count
 
 
 def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
-    """Say when so few strides count that nothing is compared, and when those next to a turn had to count."""
+    """Notices on too few strides for a comparison, and on counting those next to a turn."""
     left = Counter(s.side for s in strides if s.excluded_reason is None)
     few = [side for side in SIDES if 0 < left[side] < COMPARED]
-    said = []
+    said: list[str] = []
     if few:
         counts = " and ".join(f"{left[side]} {side}" for side in few)
         word = plural(sum(left[s] for s in few), "stride counts", "strides count")
         said.append(
-            f"Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. Walk further "
-            "straight ahead."
+            Message(
+                "Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. "
+                "Walk further straight ahead.",
+                counts=counts,
+                word=word,
+                COMPARED=COMPARED,
+            )
         )
     if near_turns:
         said.append("So few are left that strides next to a turn are counted too.")
-    return [Notice("short_walk", " ".join(said))] if said else []
+    return [Notice("short_walk", join_messages(*said))] if said else []
 
 
 def _unused(strides: Sequence[Stride]) -> list[Notice]:
-    """Say when a foot walked and nothing of it counts."""
+    """Notice on a foot that walked without any counted stride."""
     notices = []
     for side in SIDES:
         own = [s for s in strides if s.side == side]
@@ -162,10 +170,19 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
             words = ", ".join(f"{n} {reason}" for reason, n in reasons.most_common())
             said = plural(
                 len(own),
-                f"The only {side} stride does not count: {words}. How a walk starts, turns and stops is left "
-                "out: walk further straight ahead.",
-                f"None of the {len(own)} {side} strides counts: {words}. How a walk starts, turns and stops "
-                "is left out: walk further straight ahead.",
+                Message(
+                    "The only {side} stride does not count: {words}. How a walk starts, turns and stops "
+                    "is left out: walk further straight ahead.",
+                    side=side,
+                    words=words,
+                ),
+                Message(
+                    "None of the {own} {side} strides counts: {words}. How a walk starts, turns and "
+                    "stops is left out: walk further straight ahead.",
+                    own=len(own),
+                    side=side,
+                    words=words,
+                ),
             )
             notices.append(Notice("no_strides", said, FOOT[side]))
     return notices

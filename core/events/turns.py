@@ -1,13 +1,13 @@
 """Turns of the body while walking or on the spot, from the yaw of its steadiest sensor.
 
-As El-Gohary et al. 2014 (Sensors 14:356) find them for a lumbar sensor: the low-passed yaw rate exceeds
-15 °/s somewhere and stays above 5 °/s, neighbours of one direction are one turn, 45° or more in 0.5 to 10 s.
-Their 1.5 Hz lets the pelvis' own rotation through, more than 5 °/s with every step of most people; range and
-angle are taken at 0.5 Hz here (our choice), the peak velocity at theirs.
+As in El-Gohary et al. 2014 (Sensors 14:356) for a lumbar sensor: the low-passed yaw rate exceeds 15 °/s
+somewhere and stays above 5 °/s, neighbouring turns of one direction are merged, 45° or more in 0.5 to 10 s.
+Their cut-off of 1.5 Hz passes pelvic rotation, which exceeds 5 °/s in every step of most people; range and
+angle are computed at 0.5 Hz here (our choice), the peak velocity at theirs.
 
-So slow a filter makes a turn a second longer than it was. Its half height stays where it is, for a turn of
-any length and speed: the turn begins and ends where the rate passes half of what is typical of it
-(docs/science/strides.md, "Turns").
+Such a slow filter lengthens a turn by a second. Its half height is preserved for turns of any length and
+speed: the turn begins and ends where the rate crosses half of its typical value (docs/science/strides.md,
+"Turns").
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ LEVELS: Final[tuple[tuple[Segment, ...], ...]] = (
 
 @dataclass(frozen=True)
 class TurnParams:
-    """What counts as a turn (El-Gohary et al. 2014 where not said otherwise).
+    """Criteria for a turn (El-Gohary et al. 2014 unless noted).
 
     Parameters
     ----------
-    peak_rad_s, edge_rad_s : a turn exceeds the first and stays above the second. join_s : pause between two
-        turns of one direction that are one. seconds : shortest and longest. angle_rad : least.
-    height : share of the typical rate of a turn at which it begins and ends. Half, where a low-pass filter
-        leaves the edges of a steady turn; the 22 turns of ipol_walks agree within 0.2 s.
+    peak_rad_s, edge_rad_s : a turn exceeds the first and stays above the second. join_s : longest pause
+        between two merged turns of one direction. seconds : shortest and longest duration. angle_rad :
+        minimum angle.
+    height : fraction of the typical rate of a turn at which it begins and ends. Half, at which a low-pass
+        filter preserves the edges of a steady turn; the 22 turns of ipol_walks agree within 0.2 s.
     cutoff_hz, peak_cutoff_hz : of the yaw rate for edges and angle (our choice) and for the peak velocity.
     """
 
@@ -63,8 +64,8 @@ class Turn:
 
     Parameters
     ----------
-    start_s, end_s : half-open range, s. angle_rad : left positive, of all that belongs to the turn: what is
-        turned more slowly before and after this range too. peak_rad_s : greatest yaw rate, positive.
+    start_s, end_s : half-open range, s. angle_rad : left positive, including the slower rotation before and
+        after this range. peak_rad_s : peak yaw rate, positive.
     """
 
     start_s: float
@@ -79,19 +80,20 @@ class Turn:
 
     @property
     def direction(self) -> Literal["left", "right"]:
-        """Left or right, as the person sees it."""
+        """Left or right, from the person's perspective."""
         return "left" if self.angle_rad > 0.0 else "right"
 
 
 def find_turns(
     yaw_rate: Floats, valid: Bools, rate_hz: float, params: TurnParams | None = None
 ) -> tuple[Turn, ...]:
-    """Turns of a take in order of time.
+    """Turns of a recording in chronological order.
 
     Parameters
     ----------
-    yaw_rate : (n,) rad/s about the vertical, left positive. valid : (n,) False where the sensor was lost; no
-        turn is reported that touches such a sample or an end of the take: how far it went nobody saw.
+    yaw_rate : (n,) rad/s about the vertical, left positive. valid : (n,) False where the sensor was lost;
+        turns that include such a sample or an end of the recording are not reported because their angle is
+        unknown.
     """
     params = params or TurnParams()
     if len(yaw_rate) < rate_hz * params.seconds[0]:
@@ -120,9 +122,9 @@ def find_turns(
 
 
 def body_yaw_rate(take: Oriented, rate_hz: float) -> tuple[Floats, Bools]:
-    """Yaw rate (n,) in rad/s of the steadiest segment, or the mean of a pair, and where it is known (n,).
+    """Yaw rate (n,) in rad/s of the steadiest segment, or the mean of a pair, and its validity (n,).
 
-    One leg alone does not tell: its own swing is not even over a turn (20° and more).
+    One leg alone is insufficient: its own swing is asymmetric in a turn (by 20° or more).
     """
     n = len(take.t_s)
     levels = [level for level in LEVELS if all(s in take.q for s in level)]
@@ -135,7 +137,7 @@ def body_yaw_rate(take: Oriented, rate_hz: float) -> tuple[Floats, Bools]:
 
 
 def _share(valid: Mapping[Segment, Bools], worn: tuple[Segment, ...]) -> float:
-    """How much of a take sensors saw, in tenths so that the steadier ones win a tie."""
+    """Fraction of a recording with data of the sensors, in tenths so that the steadier ones win a tie."""
     return round(float(np.logical_and.reduce([valid[s] for s in worn]).mean()), 1)
 
 
@@ -146,13 +148,13 @@ def _vertical_rate(q: Floats) -> Floats:
 
 
 def _half_height(rate: Floats, height: float) -> tuple[int, int]:
-    """Outermost samples above a share of the typical rate of a turn, the mean over its angle."""
+    """Outermost samples above a fraction of the typical rate of a turn, its angle-weighted mean."""
     above = np.flatnonzero(rate > height * float((rate**2).sum() / rate.sum()))
     return int(above[0]), int(above[-1]) + 1
 
 
 def _joined(found: list[tuple[int, int]], pause: float) -> list[tuple[int, int]]:
-    """Index ranges, those with at most `pause` samples between them joined."""
+    """Index ranges, merged if at most `pause` samples apart."""
     joined: list[tuple[int, int]] = []
     for first, end in found:
         if joined and first - joined[-1][1] <= pause:

@@ -1,4 +1,4 @@
-"""What is known of a person before a take, for the start level and the guard."""
+"""Prior data about a person for the start level and the guard."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from sagittal.core.feedback.prescription import LEVELS
 
 @dataclass(frozen=True)
 class Baseline:
-    """What is known of the person before the take.
+    """Data about the person from earlier sessions.
 
     Parameters
     ----------
-    mean, sd, n : the parameter on the trained side in an earlier session; None without one.
+    mean, sd, n : of the parameter on the trained side in an earlier session; None without one.
     session_id : that session.
-    last_level : where the last training with this very record ended; None without one.
-    other_mdc, other_mdc_source : limit of change of the other side, None where no source has one.
-    after_training : an earlier visit trained the same, so this one begins with its retention block.
+    last_level : final level of the last training with the same prescription; None without one.
+    other_mdc, other_mdc_source : limit of change of the other side, None without a source.
+    after_training : an earlier visit trained the same parameter, so this one begins with a retention block.
     """
 
     mean: float | None = None
@@ -37,7 +37,7 @@ class Baseline:
 
     @staticmethod
     def from_json(data: Mapping[str, object]) -> Baseline:
-        """Read what `to_json` wrote; raises ParameterError bad_prescription."""
+        """Parse the output of `to_json`; raises ParameterError bad_prescription."""
         f = RecordFields("baseline", data)
         baseline = Baseline(
             f.number_or_none("mean", None),

@@ -1,4 +1,4 @@
-"""What the engine says of a stride, and where the training stands."""
+"""Output of the feedback engine: the cue of a stride, and the state of the training."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WHY_NOT: Final[tuple[WhyNot, ...]] = get_args(WhyNot)
 
 @dataclass(frozen=True)
 class Tone:
-    """A sound whose pitch (Hz) and level (0 to 1) grow with the error (core/feedback/zones.py)."""
+    """A sound with pitch (Hz) and volume (0 to 1) increasing with the error (core/feedback/zones.py)."""
 
     pitch: float
     level: float
@@ -36,17 +36,18 @@ class Tone:
 
 @dataclass(frozen=True)
 class Cue:
-    """One counted stride of a trained side, shown to the person or not.
+    """One counted stride of a trained side, whether or not it was shown to the person.
 
     Parameters
     ----------
-    n, side : of the stride; start_s, t_s : its two contacts, on the axis of the take.
-    value : in the unit of the parameter. error_sd : above (+) or below the target, in its sd.
+    n, side : of the stride; start_s, t_s : its two contacts, on the axis of the recording.
+    value : in the unit of the parameter. error_sd : above (+) or below the target, in sd of the target.
     zone, level, zone_low, zone_high : the zone in the unit of the parameter at the level of this stride.
-    shown : it got feedback, with a `tone` if the record asks for sound and it lies outside the zone; else
-        `why_not` says why.
-    block : number of the probe block it belongs to, from 1; None outside.
-    share_in_zone_last20 : of the training strides at this level, at most the last window (20); None without.
+    shown : feedback was given, with a `tone` if the prescription includes sound and the value is outside the
+        zone; else `why_not` holds the reason.
+    block : number of its probe block, from 1; None outside.
+    share_in_zone_last20 : of the training strides at this level, at most the last window (20); None without
+        any.
     """
 
     n: int
@@ -67,7 +68,9 @@ class Cue:
 
     @property
     def with_feedback(self) -> bool:
-        """The person was told: where only good, or only bad strides are shown, silence tells as well."""
+        """Whether the person received information: if only good, or only bad strides are shown, silence is
+        feedback too.
+        """
         return self.shown or self.why_not in {"positive_only", "bandwidth"}
 
     def to_json(self) -> dict[str, object]:
@@ -76,7 +79,7 @@ class Cue:
 
     @staticmethod
     def from_json(data: Mapping[str, object]) -> Cue:
-        """Read what `to_json` wrote; raises ParameterError bad_prescription."""
+        """Parse the output of `to_json`; raises ParameterError bad_prescription."""
         f = RecordFields("cue", data)
         tone = None
         if data.get("tone") is not None:
@@ -103,7 +106,9 @@ class Cue:
 
 @dataclass(frozen=True)
 class Summary:
-    """Strides of one kind: number, values, share in the zone; None without strides (sd: fewer than two)."""
+    """Strides of one kind: number, values, fraction in the zone; None without strides (sd: fewer than
+    two).
+    """
 
     n: int = 0
     mean: float | None = None
@@ -113,11 +118,11 @@ class Summary:
 
 @dataclass(frozen=True)
 class SideEffect:
-    """Something beside the target since the take began, or why it is not known.
+    """Change of another quantity since the start of the recording, or the reason why it is unknown.
 
     Parameters
     ----------
-    change : last strides minus the first ones. limit, source : what it is held against. beyond : it is.
+    change : last strides minus the first ones. limit, source : limit of the change. beyond : limit exceeded.
     reason : "too_few_strides", "joint_missing", "both_sides_trained", "no_limit"; None.
     """
 
@@ -137,7 +142,7 @@ class GuardState:
 
     @property
     def state(self) -> Literal["ok", "watch", "unknown"]:
-        """watch: one of them is beyond its limit; unknown: neither can be judged yet."""
+        """watch: a side effect exceeds its limit; unknown: none can be judged yet."""
         if self.other.beyond or self.gps.beyond:
             return "watch"
         known = [e for e in (self.other, self.gps) if e.reason is None]
@@ -146,15 +151,16 @@ class GuardState:
 
 @dataclass(frozen=True)
 class FeedbackState:
-    """Where the training stands after the last stride.
+    """State of the training after the last stride.
 
     Parameters
     ----------
-    strides : counted ones of the trained side. share_pct : of the training strides that get feedback now.
-    next_probe : training strides until the next probe block, block_left : strides left of the block without
-        feedback that is going on; None where there is none. window_n : strides behind `in_zone`.
-    with_feedback, without_feedback : of the training, blocks included; strides when it was switched off count
-        as without.
+    strides : counted ones of the trained side. share_pct : current percentage of training strides with
+        feedback.
+    next_probe : training strides until the next probe block. block_left : remaining strides of the current
+        block without feedback; None without one. window_n : number of strides in `in_zone`.
+    with_feedback, without_feedback : of the training, blocks included; strides with feedback switched off
+        count as without.
     """
 
     on: bool

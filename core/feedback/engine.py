@@ -1,7 +1,7 @@
-"""Strides in, cues out: zone and level, the schedule, the rules for harder, easier and stop, the guard.
+"""Strides in, cues out: zone and level, schedule, rules for level changes and stopping, guard.
 
-A pure function of the strides and commands in their order: no clock, no chance. So a crash is cured by giving
-both again, and what was shown can be told from the record alone.
+A pure function of the sequence of strides and commands: no clock, no randomness. After a crash the state is
+restored by replaying both, and the displayed cues can be derived from the record alone.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from sagittal.core.feedback.schedule import ScheduleSlot, find_slot
 from sagittal.core.feedback.stride import StrideLike
 from sagittal.core.feedback.tally import RunningStatistics
 from sagittal.core.feedback.zones import make_zones
+from sagittal.core.message import Message
 
 OPENING: Final = 10
 """Strides without feedback that give the start level where no earlier session does (our choice)."""
@@ -36,12 +37,11 @@ COMMANDS: Final[tuple[Command, ...]] = get_args(Command)
 
 
 class FeedbackEngine:
-    """Feedback of one take.
+    """Feedback for one recording.
 
     Raises
     ------
-    ParameterError
-        no_target: the target of the prescription has no numbers.
+    ParameterError no_target: the target of the prescription is not resolved.
     """
 
     def __init__(self, prescription: Prescription, baseline: Baseline | None = None) -> None:
@@ -71,15 +71,15 @@ class FeedbackEngine:
         self._told: deque[int] = deque(maxlen=REMEMBERED)
 
     def push(self, stride: StrideLike, now_s: float | None = None) -> Cue | None:
-        """Judge a stride.
+        """Evaluate a stride.
 
         Parameters
         ----------
-        now_s : last sample when the stride became known; None = it is not late.
+        now_s : last sample when the stride became known; None = not late.
 
         Returns
         -------
-        None for a stride that does not count, has no value (yet), or is of the other side.
+        None for a stride that is not counted, has no value (yet), or belongs to the other side.
         """
         value = stride.values.get(self.prescription.parameter)
         if not stride.counted or value is None or stride.n in self._told:
@@ -97,25 +97,37 @@ class FeedbackEngine:
         return cue
 
     def command(self, name: Command, value: bool | int = True) -> None:
-        """Heed a person, or the data.
+        """Execute a command of the user or the data source.
 
         Parameters
         ----------
-        name : feedback = on or off, on also goes past a stop rule that ended it; level = steps easier (+) or
-            harder (−); pause and stale = begin or end.
+        name : feedback = on or off, on also overrides a stop rule; level = steps easier (+) or harder (−);
+            pause and stale = begin or end.
 
         Raises
         ------
-        ParameterError
-            unknown_command; bad_value: a step that is not a whole number, a switch that is neither.
+        ParameterError unknown_command; bad_value: a non-integer step, or a switch value other than on or off.
         """
         if name not in COMMANDS:
             raise ParameterError(
-                "unknown_command", f"There is no command '{name}'. Expected one of {', '.join(COMMANDS)}."
+                "unknown_command",
+                Message(
+                    "There is no command '{name}'. Expected one of {COMMANDS}.",
+                    name=name,
+                    COMMANDS=", ".join(COMMANDS),
+                ),
             )
         if isinstance(value, bool) == (name == "level") or not isinstance(value, int):
             expected = "a whole number of levels" if name == "level" else "true or false"
-            raise ParameterError("bad_value", f"The value of {name} is {value!r}. Expected {expected}.")
+            raise ParameterError(
+                "bad_value",
+                Message(
+                    "The value of {name} is {value}. Expected {expected}.",
+                    name=name,
+                    value=repr(value),
+                    expected=expected,
+                ),
+            )
         if name == "level":
             self._ladder.move(value)
         elif name == "pause":
@@ -130,7 +142,7 @@ class FeedbackEngine:
 
     @property
     def state(self) -> FeedbackState:
-        """Where the training stands."""
+        """State of the training."""
         at = self._place()
         training = self._opening_left == 0 and self._stopped is None
         low, high = self._ladder.limits
@@ -193,7 +205,7 @@ class FeedbackEngine:
         )
 
     def _why_not(self, at: ScheduleSlot, zone: Zone, late: bool) -> WhyNot | None:
-        """The first of all reasons against showing this stride."""
+        """The first applicable reason not to show this stride."""
         p = self.prescription
         reasons: tuple[tuple[bool, WhyNot], ...] = (
             (self._opening_left > 0, self._opening),
@@ -209,11 +221,11 @@ class FeedbackEngine:
         return next((why for holds, why in reasons if holds), None)
 
     def _running(self, why: WhyNot | None) -> bool:
-        """The schedule and the level rule go on with this stride."""
+        """Whether schedule and level rule advance with this stride."""
         return why in {None, "probe", "faded", "positive_only", "bandwidth"}
 
     def _count(self, cue: Cue, value: float) -> None:
-        """Move on by a stride."""
+        """Advance by one stride."""
         self._strides += 1
         if self._opening_left:
             self._opened.append(value)

@@ -1,4 +1,4 @@
-"""Reading a record field by field: what is left out has its default, what is not understood is refused."""
+"""Field-by-field parsing of a record: absent fields have defaults, invalid ones are rejected."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from math import inf, isfinite
 from typing import Any, Final, TypeVar
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 Name = TypeVar("Name")
 
@@ -18,19 +19,24 @@ _MISSING: Final = object()
 class RecordFields:
     """The fields of one object of a record.
 
-    Every reader returns the default where the field is absent, and raises ParameterError bad_prescription
-    with what was expected and what was found; `refuse_unknown` refuses fields nobody read.
+    Every reader returns the default if the field is absent, and raises ParameterError bad_prescription with
+    the expected and the actual value; `refuse_unknown` rejects fields that were not read.
     """
 
     def __init__(self, path: str, data: object) -> None:
         if not isinstance(data, Mapping):
-            raise ParameterError(CODE, f"{path} is {data!r}. Expected an object with named fields.")
+            raise ParameterError(
+                CODE,
+                Message(
+                    "{path} is {data}. Expected an object with named fields.", path=path, data=repr(data)
+                ),
+            )
         self._path = path
         self._data: Mapping[Any, object] = data
         self._read: set[str] = set()
 
     def part(self, name: str) -> RecordFields:
-        """An object inside this one; absent = all its defaults."""
+        """A nested object; absent = all defaults."""
         found = self._take(name, {})
         return RecordFields(name if self._path == "prescription" else f"{self._path}.{name}", found)
 
@@ -41,7 +47,7 @@ class RecordFields:
     def number_or_none(
         self, name: str, default: float | None, least: float = -inf, most: float = inf
     ) -> float | None:
-        """Read the same, or null."""
+        """A finite number within limits, or null."""
         found = self._take(name, default)
         return None if found is None else self._number(name, found, least, most)
 
@@ -50,12 +56,12 @@ class RecordFields:
         return self._whole(name, self._take(name, default), least, most)
 
     def whole_or_none(self, name: str, default: int | None, least: int, most: int) -> int | None:
-        """Read the same, or null."""
+        """A whole number within limits, or null."""
         found = self._take(name, default)
         return None if found is None else self._whole(name, found, least, most)
 
     def flag(self, name: str, default: bool) -> bool:
-        """Read true or false."""
+        """A boolean."""
         found = self._take(name, default)
         if not isinstance(found, bool):
             raise self._wrong(name, found, "true or false")
@@ -78,7 +84,7 @@ class RecordFields:
         raise self._wrong(name, found, f"a list of at least one of {', '.join(map(str, allowed))}")
 
     def percents(self, name: str, default: tuple[int, ...]) -> tuple[int, ...]:
-        """A list of shares in whole percent."""
+        """A list of whole percentages."""
         found = self._take(name, default)
         if isinstance(found, list | tuple) and 1 <= len(found) <= 20:
             numbers = [x for x in found if isinstance(x, int) and not isinstance(x, bool) and 0 <= x <= 100]
@@ -87,18 +93,24 @@ class RecordFields:
         raise self._wrong(name, found, "a list of 1 to 20 whole percents from 0 to 100")
 
     def text(self, name: str, default: str | None) -> str | None:
-        """Read a line of text."""
+        """A line of text."""
         found = self._take(name, default)
         if found is None or (isinstance(found, str) and len(found) <= 500):
             return found
         raise self._wrong(name, found, "text of at most 500 characters")
 
     def refuse_unknown(self) -> None:
-        """Refuse what nobody asked for: a misspelt field must not be silently ignored."""
+        """Reject fields that were not read: a misspelt field must not be silently ignored."""
         unknown = sorted(str(k) for k in self._data.keys() - self._read)
         if unknown:
             raise ParameterError(
-                CODE, f"{self._path} has {', '.join(unknown)}. Expected only {', '.join(sorted(self._read))}."
+                CODE,
+                Message(
+                    "{path} has {unknown}. Expected only {join}.",
+                    path=self._path,
+                    unknown=", ".join(unknown),
+                    join=", ".join(sorted(self._read)),
+                ),
             )
 
     def _number(self, name: str, found: object, least: float, most: float) -> float:
@@ -120,4 +132,13 @@ class RecordFields:
         return self._data.get(name, default)
 
     def _wrong(self, name: str, found: object, expected: str) -> ParameterError:
-        return ParameterError(CODE, f"{self._path}.{name} is {found!r}. Expected {expected}.")
+        return ParameterError(
+            CODE,
+            Message(
+                "{path}.{name} is {found}. Expected {expected}.",
+                path=self._path,
+                name=name,
+                found=repr(found),
+                expected=expected,
+            ),
+        )

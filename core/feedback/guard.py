@@ -1,7 +1,7 @@
-"""Side effects while training: the other side, and the sagittal profile of both legs.
+"""Side effects of the training: the other side, and the sagittal profile of both legs.
 
-The target parameter decides which others follow, also for the worse (Legrand et al. 2025).
-Compared are the last strides with the first ones of the take, of which nothing was fed back yet or hardly.
+The target parameter affects others, possibly for the worse (Legrand et al. 2025). The last strides are
+compared with the first ones of the recording, which had little or no feedback yet.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ GPS_MCID: Final = (1.6, "MCID of the GPS, Baker et al. 2012, children")
 
 
 class GuardWatch:
-    """Collects counted strides of both sides and judges what changed; keeps `FIRST` + `LAST` of each side."""
+    """Collects counted strides of both sides and evaluates changes; stores `FIRST` + `LAST` of each side."""
 
     def __init__(self, prescription: Prescription, baseline: Baseline) -> None:
         self._side = prescription.side
@@ -48,11 +48,11 @@ class GuardWatch:
 
     @property
     def state(self) -> GuardState:
-        """As of the last stride."""
+        """State after the last stride."""
         return self._state
 
     def add_stride(self, side: Side, value: float, curves: Mapping[str, Floats]) -> None:
-        """Take in a counted stride: its value of the parameter and its curves (101,) in rad."""
+        """Add a counted stride: its value of the parameter and its curves (101,) in rad."""
         self._values[side].append(value)
         if all(v in curves for v in SAGITTAL):
             self._curves[side].append(np.stack([np.degrees(curves[v]) for v in SAGITTAL]))
@@ -89,7 +89,7 @@ class GuardWatch:
 
 
 class _Ends(Generic[T]):
-    """The first strides, and the last of those after them."""
+    """The first strides, and the last of the later ones."""
 
     def __init__(self) -> None:
         self.first: list[T] = []
@@ -97,7 +97,7 @@ class _Ends(Generic[T]):
 
     @property
     def known(self) -> bool:
-        """Enough of both to compare."""
+        """Whether there are enough of both for a comparison."""
         return len(self.last) >= FIRST
 
     def append(self, value: T) -> None:
@@ -108,8 +108,9 @@ class _Ends(Generic[T]):
 
 
 def _gps_sagittal(means: Mapping[Side, Floats]) -> float:
-    """Sagittal profile of the mean curves (3, 101) in degrees of both sides, shape without level: standing is
-    the only zero a live angle has."""
+    """Sagittal profile score of the mean curves (3, 101) in degrees of both sides, shape only: live angles
+    are relative to standing.
+    """
     reference = adult_reference().mean_deg
     found = {
         side: {

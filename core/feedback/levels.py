@@ -1,4 +1,6 @@
-"""How hard it is now, and the rule that changes it (Schließmann et al. 2018; docs/science/feedback.md)."""
+"""Current difficulty level, and the rule that changes it (Schließmann et al. 2018;
+docs/science/feedback.md).
+"""
 
 from __future__ import annotations
 
@@ -14,10 +16,11 @@ from sagittal.core.feedback.zones import Zones
 
 
 class Ladder:
-    """The level of one take, and the strides at it that the rule looks at.
+    """Level in one recording, and the strides at that level used by the rule.
 
-    It begins where the last training with this record ended, else at the level of the record, else at the
-    hardest one whose zone holds what the person usually does: before this visit, or in its first strides.
+    The initial level is the final one of the last training with this prescription, else the level of the
+    prescription, else the hardest one whose zone contains the person's usual value: from before this visit,
+    or from its first strides.
     """
 
     def __init__(self, zones: Zones, rule: Progression, baseline: Baseline) -> None:
@@ -34,12 +37,12 @@ class Ladder:
 
     @property
     def known(self) -> bool:
-        """Something has said where to begin, and on which side of the target the person is."""
+        """Whether the initial level and the person's side of the target are known."""
         return self._begun and self.zones.worse is not None
 
     @property
     def window_n(self) -> int:
-        """Strides at this level, at most the window."""
+        """Number of strides at this level, at most the window."""
         return len(self._recent)
 
     @property
@@ -48,31 +51,31 @@ class Ladder:
         return self.zones.limits(self.level)
 
     def zone(self, value: float) -> Zone:
-        """Where a value lies at this level."""
+        """Zone of a value at this level."""
         return self.zones.zone(value, self.level)
 
     def share(self, zone: Zone) -> float | None:
-        """Share of the strides at this level that lay in a zone; None without any."""
+        """Fraction of the strides at this level in a zone; None without any."""
         return sum(z == zone for z in self._recent) / len(self._recent) if self._recent else None
 
     def add_stride(self, zone: Zone) -> None:
-        """Take in a training stride."""
+        """Add a training stride."""
         self._recent.append(zone)
 
     def end_first_strides(self, values: Sequence[float]) -> None:
-        """End of the strides a visit begins with: they say what nothing else has said."""
+        """End of the opening strides of a visit, which provide missing prior data."""
         usual = fmean(values)
         self._know_side(usual)
         if not self._begun:
             self.level, self._begun = self.zones.start_level(usual), True
 
     def move(self, steps: int) -> None:
-        """A person makes it easier (+) or harder (−)."""
+        """Manual change: easier (+) or harder (−)."""
         self._begun = True
         self._set(self.level + steps)
 
     def follow_rule(self) -> None:
-        """Harder or easier, if the last strides say so; then a new window begins."""
+        """Make it harder or easier if indicated by the last strides; a new window then begins."""
         if not self._rule.automatic or len(self._recent) < self._rule.window:
             return
         worse = self.zones.worse

@@ -1,7 +1,7 @@
-"""What is trained and how: one parameter, its target, when feedback is given, how hard, when to stop.
+"""Prescription of the training: one parameter, its target, feedback schedule, difficulty, stop rules.
 
 One parameter at a time (Schließmann et al. 2018; docs/science/feedback.md); target, mode, schedule and dose
-are fields of the record because reviews find that studies differ in them (Spencer et al. 2021).
+are fields of the prescription because reviews find that studies differ in them (Spencer et al. 2021).
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ LEVELS: Final = 20
 
 @dataclass(frozen=True)
 class Target:
-    """Where the value should be.
+    """Target value.
 
     Parameters
     ----------
     source : norm = healthy people at this person's speed; own_better_side, own_baseline = the person's other
-        side, where that is the better one, or same side in an earlier session; manual = entered.
-    mean, sd : in the unit of the parameter; None until a take resolves them. A level is as wide as `sd`.
-    words : who or what is behind them, as printed. session_id : the session they are taken from.
+        side, if that is the better one, or the same side in an earlier session; manual = entered.
+    mean, sd : in the unit of the parameter; None until resolved in a recording. A level has the width `sd`.
+    words : printed description of their source. session_id : session they are taken from.
     """
 
     source: TargetSource = "norm"
@@ -49,22 +49,24 @@ class Target:
 
     @property
     def resolved(self) -> bool:
-        """Mean and sd are known."""
+        """Whether mean and sd are known."""
         return self.mean is not None and self.sd is not None
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """Which strides get feedback.
+    """Selection of strides with feedback.
 
     Parameters
     ----------
-    kind : every stride, or fading: the share goes down step by step.
-    shares_pct, strides_per_share : the steps and how many training strides each lasts; the last one stays.
-        shares and length are our choice.
-    probe_every, probe_strides : after so many training strides, so many without feedback; None = no probes.
-        Errors return at once when feedback goes (Roemmich et al. 2016): only probes show what was learnt.
-    retention_strides : without feedback at the start of a visit that follows a training of the same.
+    kind : every stride, or fading: the percentage decreases step by step.
+    shares_pct, strides_per_share : the steps and the number of training strides in each; the last one is
+        permanent. Percentages and length are our choice.
+    probe_every, probe_strides : number of training strides before a probe block, and of strides without
+        feedback in it; None = no probes. Errors return immediately without feedback (Roemmich et al. 2016):
+        only probes show learning.
+    retention_strides : strides without feedback at the start of a visit that follows a training of the same
+        parameter.
     """
 
     kind: ScheduleKind = "fading"
@@ -77,14 +79,15 @@ class Schedule:
 
 @dataclass(frozen=True)
 class Progression:
-    """How hard it is, and when that changes (Schließmann et al. 2018).
+    """Difficulty and its changes (Schließmann et al. 2018).
 
     Parameters
     ----------
-    automatic : levels follow the rule; else only the therapist changes them.
-    window : strides at one level that a decision needs. share : of them in the zone, above it is made harder.
-    away_share : of them beyond the yellow zone on the worse side, above it is made easier; the source says
-        "too many", half is our choice.
+    automatic : levels follow the rule; otherwise only the therapist changes them.
+    window : number of strides at one level for a decision. share : fraction of them in the zone above which
+        it becomes harder.
+    away_share : fraction of them outside the yellow zone on the worse side above which it becomes easier; the
+        source states "too many", half is our choice.
     sd_per_level : width of a level in sd of the target. start_level : None = from the baseline.
     worse : side of the target the person is on; None = from the baseline.
     """
@@ -100,12 +103,13 @@ class Progression:
 
 @dataclass(frozen=True)
 class StopRule:
-    """When feedback ends by itself.
+    """Automatic end of feedback.
 
     Parameters
     ----------
-    max_strides : counted strides of the take. max_minutes : since its first stride; 15 is the dose of a visit
-        in Schließmann et al. 2018, 5 × 2 to 3 minutes. gps_rise_deg : rise of `gps_sagittal` since the start.
+    max_strides : counted strides of the recording. max_minutes : since its first stride; 15 is the dose of a
+        visit in Schließmann et al. 2018, 5 × 2 to 3 minutes. gps_rise_deg : rise of `gps_sagittal` since the
+        start.
     """
 
     max_strides: int | None = None
@@ -115,14 +119,14 @@ class StopRule:
 
 @dataclass(frozen=True)
 class SideEffectGuard:
-    """Side effects that are looked for while training (Legrand et al. 2025: feedback on
-    stance time cost 7.9 points of the GDI).
+    """Monitored side effects of the training (Legrand et al. 2025: feedback on stance time reduced the GDI by
+    7.9 points).
 
     Parameters
     ----------
-    other_change : of the same parameter on the other side; None = its MDC, where a source has one, else two
-        sd of the strides it began with. gps_rise_deg : of `gps_sagittal`; 1.6° is the MCID of the GPS (Baker
-        et al. 2012, children), twice that stops.
+    other_change : of the same parameter on the other side; None = its MDC, if published, else two sd of the
+        first strides. gps_rise_deg : of `gps_sagittal`; 1.6° is the MCID of the GPS (Baker et al. 2012,
+        children), twice that stops the training.
     """
 
     other_change: float | None = None
@@ -136,8 +140,8 @@ class Prescription:
     Parameters
     ----------
     side : None = strides of both. band_sd : half width of the zone at level 0, in sd of the target.
-    modes : how it is shown. positive_only : only strides in the zone get a cue (Heel2Toe); bandwidth : only
-        strides outside of it do. Not both.
+    modes : presentation. positive_only : only strides in the zone get a cue (Heel2Toe); bandwidth : only
+        those outside. Not both.
     """
 
     parameter: str
@@ -158,12 +162,11 @@ class Prescription:
 
     @staticmethod
     def from_json(data: Mapping[str, object]) -> Prescription:
-        """Read and check a record; what is left out has its default.
+        """Parse and validate a record; absent fields have defaults.
 
         Raises
         ------
-        ParameterError
-            bad_prescription: what was expected of which field, what was found.
+        ParameterError bad_prescription: the message states the field, the expected and the actual value.
         """
         return _prescription(data)
 

@@ -1,4 +1,6 @@
-"""Which training strides get feedback: a pure function of their number, so that it can be told beforehand."""
+"""Selection of training strides with feedback: a pure function of their number, so that it is known in
+advance.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +11,14 @@ from sagittal.core.feedback.prescription import Schedule
 
 @dataclass(frozen=True)
 class ScheduleSlot:
-    """A stride's place in a schedule.
+    """Position of a stride in a schedule.
 
     Parameters
     ----------
-    shown : it gets feedback. share_pct : of the step of fading it lies in.
+    shown : feedback is given. share_pct : of its fading step.
     block : number of its probe block, from 1; None in training.
-    next_probe : training strides until the next block begins, itself included; None in a block or without.
-    block_left : strides of its block, itself included; None in training.
+    next_probe : training strides until the next block, itself included; None in a block or without blocks.
+    block_left : remaining strides of its block, itself included; None in training.
     """
 
     shown: bool
@@ -27,9 +29,9 @@ class ScheduleSlot:
 
 
 def find_slot(schedule: Schedule, position: int) -> ScheduleSlot:
-    """Where the stride of this number, from 0 and probes included, lies.
+    """Position of a stride by its number, from 0 and including probes.
 
-    Fading counts training strides only. Of every step exactly its share is shown, spread evenly: after k
+    Fading counts training strides only. In every step exactly its percentage is shown, spread evenly: after k
     strides of a step with share p, ⌊k p⌋ were shown.
     """
     every, probes = schedule.probe_every, schedule.probe_strides
@@ -47,7 +49,7 @@ def find_slot(schedule: Schedule, position: int) -> ScheduleSlot:
 
 
 def _step(schedule: Schedule, trained: int) -> tuple[int, int]:
-    """Share in % of the step of fading, and the stride's number in it."""
+    """Percentage of the fading step, and the stride's number in it."""
     if schedule.kind == "every":
         return 100, trained
     step = min(trained // schedule.strides_per_share, len(schedule.shares_pct) - 1)

@@ -1,4 +1,4 @@
-"""What feedback needs of a stride."""
+"""Interface of strides used by feedback."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from sagittal.core.frames import Floats, Side
 
 
 class StrideLike(Protocol):
-    """What is needed of a live stride (sagittal.core.online.LiveStride)."""
+    """Required properties of a live stride (sagittal.core.online.LiveStride)."""
 
     @property
     def n(self) -> int:
-        """Running number over both feet; the same stride may come twice, its distances last."""
+        """Running number over both feet; a stride may be repeated when its distances become available."""
 
     @property
     def side(self) -> Side:
@@ -29,7 +29,7 @@ class StrideLike(Protocol):
 
     @property
     def detected_s(self) -> float:
-        """Last sample that was needed."""
+        """Last sample required."""
 
     @property
     def values(self) -> Mapping[str, float | None]:
@@ -41,4 +41,4 @@ class StrideLike(Protocol):
 
     @property
     def counted(self) -> bool:
-        """Nothing speaks against it: no turn, no gap."""
+        """Whether the stride is counted: no turn, no gap."""

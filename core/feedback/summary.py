@@ -1,8 +1,9 @@
-"""After the take: strides with and without feedback apart, probe blocks, the course of the level, retention.
+"""Summary after the recording: strides with and without feedback, probe blocks, course of the level,
+retention.
 
-Cues were given on live values; what is summed up here are the strides of the finished analysis, each with the
-cue that starts when it does. Errors return at once when feedback goes (Roemmich et al. 2016), so the strides
-without it are the ones that say what was learnt.
+Cues were based on live values; the summary uses the strides of the final analysis, each with the cue that
+starts at the same time. Errors return immediately without feedback (Roemmich et al. 2016), so the strides
+without it show learning.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ _KINDS: Final[Mapping[WhyNot, Kind]] = {
 
 @dataclass(frozen=True)
 class AnalysedStride:
-    """A stride of the finished analysis; value None where it was not measured."""
+    """A stride of the final analysis; value None if not measured."""
 
     side: Side
     start_s: float
@@ -52,7 +53,7 @@ class AnalysedStride:
 
 @dataclass(frozen=True)
 class MatchedStride:
-    """A stride with the cue it got; `value` is that of the analysis, `inside` its zone's."""
+    """A stride with its cue; `value` is from the analysis, `inside` relative to the zone of the cue."""
 
     cue: Cue
     value: float
@@ -61,7 +62,7 @@ class MatchedStride:
 
 @dataclass(frozen=True)
 class ProbeBlock:
-    """A block without feedback, and the training strides right before it, as many."""
+    """A block without feedback, and the same number of training strides right before it."""
 
     number: int
     start_s: float
@@ -71,7 +72,7 @@ class ProbeBlock:
 
 @dataclass(frozen=True)
 class LevelStep:
-    """From this stride on the level was this."""
+    """Start of a level, by stride."""
 
     n: int
     t_s: float
@@ -80,14 +81,14 @@ class LevelStep:
 
 @dataclass(frozen=True)
 class FeedbackSplit:
-    """Strides of the trained side after a take.
+    """Strides of the trained side after a recording.
 
     Parameters
     ----------
     strides : matched and counted, in order. kinds : "with", "without" and its parts, and the opening block.
-    probes : in order. levels : where it began, and every change. end : last training strides.
-    unmatched : cues without a stride in the analysis. left_out : cues of strides that do not count there.
-    live_difference : mean and sd of live minus final value: what the person was told against what was.
+        probes : in order. levels : initial one and every change. end : last training strides.
+    unmatched : cues without a stride in the analysis. left_out : cues of strides not counted there.
+    live_difference : mean and sd of live minus final value.
     """
 
     strides: tuple[MatchedStride, ...]
@@ -101,11 +102,12 @@ class FeedbackSplit:
 
 
 def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSplit:
-    """Put every cue to its stride and sum up.
+    """Match every cue with its stride and summarise.
 
     Parameters
     ----------
-    strides : of the analysis, counted or not. cues : of the take, in order; of a stride told twice the first.
+    strides : of the analysis, counted or not. cues : of the recording, in order; for a stride with two cues
+        the first is used.
     """
     matched: list[MatchedStride] = []
     unmatched = left_out = 0
@@ -142,12 +144,12 @@ def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSpl
 
 
 def classify_stride(cue: Cue) -> Kind:
-    """Which kind of stride this was."""
+    """Kind of a stride."""
     return "with" if cue.with_feedback or cue.why_not is None else _KINDS[cue.why_not]
 
 
 def summarise_strides(strides: Iterable[MatchedStride]) -> Summary:
-    """Number, mean, sd and share in the zone."""
+    """Number, mean, sd and fraction in the zone."""
     tally = RunningStatistics()
     for m in strides:
         tally.add(m.value, m.inside)
@@ -155,7 +157,7 @@ def summarise_strides(strides: Iterable[MatchedStride]) -> Summary:
 
 
 class _Starts:
-    """Strides of one side by when they begin, each taken once."""
+    """Strides of one side by start time, each matched at most once."""
 
     def __init__(self, strides: Iterable[AnalysedStride]) -> None:
         self._strides = sorted(strides, key=lambda s: s.start_s)

@@ -1,4 +1,4 @@
-"""Running mean, sd and share in the zone of strides, without keeping them."""
+"""Running mean, sd and fraction in the zone of strides, without storing them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sagittal.core.feedback.cue import Summary
 
 
 class RunningStatistics:
-    """Counts strides one by one (Welford 1962: mean and squares in one pass)."""
+    """Accumulates strides one by one (Welford 1962: mean and squares in one pass)."""
 
     def __init__(self) -> None:
         self._n = 0
@@ -17,7 +17,7 @@ class RunningStatistics:
         self._inside = 0
 
     def add(self, value: float, inside: bool) -> None:
-        """One more stride."""
+        """Add one stride."""
         self._n += 1
         self._inside += inside
         away = value - self._mean
@@ -26,7 +26,7 @@ class RunningStatistics:
 
     @property
     def summary(self) -> Summary:
-        """So far; sd with n − 1."""
+        """Summary so far; sd with n − 1."""
         if self._n == 0:
             return Summary()
         sd = None if self._n == 1 else sqrt(self._squares / (self._n - 1))

@@ -1,7 +1,7 @@
-"""The zone of a level, where a value lies in it, and the sound of an error.
+"""Zones of the levels, classification of values, and the sound of an error.
 
-Level 0 is the target ± band. Each level above adds one width, an sd of the target, on the side where the
-person is; the other, overshooting side stays as at level 0 (Schließmann et al. 2018).
+Level 0 is the target ± band. Each higher level extends it by one width, an sd of the target, on the side of
+the person; the other, overshooting side is unchanged (Schließmann et al. 2018).
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ class Zones:
     Parameters
     ----------
     mean, sd : of the target, in the unit of the parameter. band : half width of level 0 in sd.
-    width : of a level, and of the yellow zone, in sd. worse : the side that levels widen; None = neither yet.
+    width : of a level, and of the yellow zone, in sd. worse : the side extended by levels; None = not yet
+        known.
     """
 
     mean: float
@@ -38,7 +39,7 @@ class Zones:
     worse: Towards | None = None
 
     def error_sd(self, value: float) -> float:
-        """Distance from the target in its sd, above positive."""
+        """Deviation from the target in its sd, above positive."""
         return (value - self.mean) / self.sd
 
     def limits(self, level: int) -> tuple[float, float]:
@@ -58,16 +59,16 @@ class Zones:
         return "in"
 
     def start_level(self, usual: float) -> int:
-        """Hardest level whose zone holds the value a person usually has."""
+        """Hardest level whose zone contains the person's usual value."""
         beyond = (abs(self.error_sd(usual)) - self.band) / self.width
         return min(max(ceil(beyond - 1e-9), 0), LEVELS)
 
     def side_of(self, usual: float) -> Towards:
-        """Which side of the target a value is on."""
+        """Side of the target on which a value is."""
         return "low" if usual < self.mean else "high"
 
     def tone(self, value: float, level: int) -> Tone | None:
-        """Sound of a value; None inside the zone, which is the dead band."""
+        """Sound for a value; None inside the zone, which is the dead band."""
         low, high = self.limits(level)
         beyond = max(low - value, value - high) / self.sd
         if beyond <= 0.0:
@@ -78,7 +79,7 @@ class Zones:
 
 
 def make_zones(prescription: Prescription, worse: Towards | None) -> Zones | None:
-    """Zones of a record; None where its target has no numbers yet."""
+    """Zones of a prescription; None if its target is not resolved."""
     t = prescription.target
     if t.mean is None or t.sd is None:
         return None

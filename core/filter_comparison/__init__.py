@@ -1,6 +1,6 @@
-"""The same take through several orientation filters: how far they are apart, and from a reference.
+"""Comparison of orientation filters on one recording: with each other, and with a reference.
 
-docs/science/filter-comparison.md says how each number is made.
+docs/science/filter-comparison.md defines each quantity.
 """
 
 from sagittal.core.filter_comparison.compare import compare_filters

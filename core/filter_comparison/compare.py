@@ -1,4 +1,4 @@
-"""The one function: an analysed take through several filters."""
+"""Entry point: several filters on an analysed recording."""
 
 from __future__ import annotations
 
@@ -39,6 +39,7 @@ from sagittal.core.formats.orientation_table import OrientationTable
 from sagittal.core.frames import SIDES, Bools, Floats, Segment
 from sagittal.core.fusion.algorithms.choice import LABELS
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.pipeline import Progress, TakeAnalysis
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import Window
@@ -59,22 +60,21 @@ def compare_filters(
     clock: Clock,
     reference: OrientationTable | None = None,
 ) -> FilterComparison:
-    """Run filters on the sensors of an analysed take and compare them.
+    """Run filters on the sensors of an analysed recording and compare them.
 
-    All get the same samples, mountings, start and strides: those of the analysis. A filter that cannot run or
-    diverges is told and left out; the others are compared without it.
+    All use the same samples, alignment, initial state and strides: those of the analysis. A filter that
+    cannot run or diverges is reported and omitted; the others are compared without it.
 
     Parameters
     ----------
-    strides : of the analysis, as a person may have changed them.
-    clock : seconds; its differences are the cost.
-    reference : orientations of another system.
+    strides : of the analysis, including manual edits.
+    clock : returns seconds; used to measure computing time.
+    reference : orientations from another system.
 
     Raises
     ------
-    EstimationError `nothing_calibrated`; `no_orientations` of squats; `no_filter_ran` where every filter
-    refused or diverged.
-    FormatError of `place_reference`.
+    EstimationError `nothing_calibrated`; `no_orientations` for squats; `no_filter_ran` if every filter
+    failed. FormatError as `place_reference`.
     """
     calibrated, alone, own = _require_orientations(analysis)
     recording = calibrated.recording
@@ -127,7 +127,7 @@ def compare_filters(
 
 
 def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, Orientations, Orientations]:
-    """What is calibrated, its orientations sensor by sensor, and those of the product."""
+    """The calibrated recording, its single-sensor orientations, and the final ones of the analysis."""
     mounted = analysis.mounted
     calibrated = analysis.calibrated if mounted is None else mounted.calibrated
     alone = analysis.fused if mounted is None else mounted.orientations
@@ -139,23 +139,27 @@ def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, 
                 "Squats are followed by the chain of the leg; filters are compared on walks.",
             )
         why = "" if analysis.problem is None else f" {analysis.problem.message}"
-        raise EstimationError("nothing_calibrated", f"No sensor of this take is calibrated.{why}")
+        raise EstimationError(
+            "nothing_calibrated", Message("No sensor of this take is calibrated.{why}", why=why)
+        )
     return calibrated, alone, own
 
 
 def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
     if not any(run.q for run in runs.values()):
         told = next(run.told[0].message for run in runs.values())
-        raise EstimationError("no_filter_ran", f"No filter gave a result. The first says: {told}")
+        raise EstimationError(
+            "no_filter_ran", Message("No filter gave a result. The first says: {told}", told=told)
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Kept:
-    """The take on the samples on which filters are compared.
+    """The recording at the samples used for the comparison.
 
     Parameters
     ----------
-    zero : of joint angles. chain : segment → (m, 4) to W by the product. valid : segment → (m,).
+    zero : of joint angles. chain : segment → (m, 4) to W by the analysis. valid : segment → (m,).
     """
 
     t_s: Floats
@@ -165,7 +169,7 @@ class _Kept:
     valid: Mapping[Segment, Bools]
 
     def measure_angles(self, q: Mapping[Segment, Floats]) -> JointAngles:
-        """Joint angles of orientations on these samples, zeroed as the take's."""
+        """Joint angles of orientations at these samples, with the zero of the recording."""
         valid = {s: self.valid[s] for s in q}
         return measure_angles(Orientations(self.t_s, self.rate_hz, q, valid, "compared"), self.zero)
 
@@ -173,7 +177,7 @@ class _Kept:
 def _spread_segments(
     runs: Mapping[str, FilterRun], kept: _Kept
 ) -> tuple[dict[str, tuple[Floats, Floats, int]], dict[Segment, Floats]]:
-    """Spread of inclination and heading by quantity: SD, range, of how many filters; and their medians."""
+    """Spread of inclination and heading by quantity: SD, range, number of filters; and their medians."""
     spreads: dict[str, tuple[Floats, Floats, int]] = {}
     medians = {}
     for s, near in kept.chain.items():
@@ -187,7 +191,7 @@ def _spread_segments(
 def _agree(
     name: str | None, run: FilterRun, medians: Mapping[Segment, Floats], kept: _Kept
 ) -> FilterAgreement:
-    """One row of the table: RMS over all segments against the median and the product's own chain."""
+    """One row of the table: RMS over all segments relative to the median and to the analysis."""
     by_median, by_own = (
         {
             s: score
@@ -199,9 +203,9 @@ def _agree(
     told = run.told
     to_median = pool_scores(list(by_median.values()))
     if name is not None and to_median is not None and to_median.total > FAR:
-        message = (
-            f"{np.degrees(to_median.total):.0f}° from the median: far from the others. "
-            "Leave it out to see the spread of the rest."
+        message = Message(
+            "{total:.0f}° from the median: far from the others. Leave it out to see the spread of the rest.",
+            total=np.degrees(to_median.total),
         )
         told = (*told, Notice(FAR_CODE, message))
     label = OWN_CHAIN if name is None else LABELS[name]
@@ -210,14 +214,23 @@ def _agree(
 
 
 def _tell(agreements: list[FilterAgreement]) -> tuple[Notice, ...]:
-    """What of all filters must be said above the results."""
+    """Notices on all filters, shown above the results."""
     missing = [a.label for a in agreements if a.to_median is None]
     far = [a.label for a in agreements if any(n.code == FAR_CODE for n in a.told)]
     told = []
     if missing:
-        told.append(Notice("filters_left_out", f"No result, the table says why: {', '.join(missing)}."))
+        told.append(
+            Notice(
+                "filters_left_out",
+                Message("No result, the table says why: {missing}.", missing=", ".join(missing)),
+            )
+        )
     if far:
-        told.append(Notice("filters_far", f"Far from the others, and in the spread: {', '.join(far)}."))
+        told.append(
+            Notice(
+                "filters_far", Message("Far from the others, and in the spread: {far}.", far=", ".join(far))
+            )
+        )
     return tuple(told)
 
 
@@ -229,7 +242,7 @@ def _score(
     valid: Mapping[Segment, Bools],
     zero_offset: Mapping[str, float],
 ) -> ReferenceScores:
-    """RMS errors and Bland–Altman of every filter, segment and joint angle that the reference has."""
+    """RMS errors and Bland–Altman statistics of every filter, segment and joint angle in the reference."""
     known = {s: np.isfinite(q[:, 0]) & valid[s] for s, q in placed.q.items()}
     whole = {s: np.where(known[s][:, None], q, (1.0, 0.0, 0.0, 0.0)) for s, q in placed.q.items()}
     joints = measure_reference_angles(whole, known, zero_offset) if whole else {}

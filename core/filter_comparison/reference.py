@@ -1,8 +1,9 @@
-"""A reference from another system laid onto a take: its clock, its world, and how its markers sit.
+"""Alignment of an external reference with a recording: clock offset, world frame, and marker orientation.
 
-Three things are fitted and told, because no file says them. The lag: where the angular speeds, which no frame
-changes, correlate best. And by segment one constant turn of the world and one of the sensor, to the median of
-the filters: what all have in common does not show, and filters near the median look better than others.
+Three quantities are fitted and reported because no file contains them. The lag: where the angular speeds,
+which are independent of frames, correlate best. And per segment one constant rotation of the world and one of
+the sensor, relative to the median of the filters: errors common to all filters are therefore invisible, and
+filters near the median appear better than others.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from sagittal.core.filter_comparison.result import BlandAltman
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.orientation_table import OrientationTable
 from sagittal.core.frames import SEGMENTS, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, log, mean, multiply, normalise, rotate, wrap_angle, yaw
 
 LEAST_OVERLAP_S: Final = 5.0
@@ -45,7 +47,7 @@ POINTS: Final = 80
 
 @dataclass(frozen=True, eq=False)
 class PlacedReference:
-    """A reference in W, as the take's segments: segment → (m, 4) on the kept samples, NaN where unknown."""
+    """A reference in W, by segment: segment → (m, 4) at the compared samples, NaN where unknown."""
 
     q: Mapping[Segment, Floats]
     lag_s: float
@@ -60,12 +62,12 @@ def place_reference(
     valid: Mapping[Segment, Bools],
     t_s: Floats,
 ) -> PlacedReference:
-    """Lay a reference onto a take.
+    """Align a reference with a recording.
 
     Parameters
     ----------
-    worn : device → segment, for columns that are named by the sensor. median : segment → (m, 4) segment to W
-        of the filters. t_s : (m,) uniform.
+    worn : device → segment, for columns named by sensor. median : segment → (m, 4) segment to W, median of
+        the filters. t_s : (m,) uniform.
 
     Raises
     ------
@@ -102,27 +104,41 @@ def _check_reference(
     if not common:
         raise FormatError(
             "no_common_segment",
-            f"{table.source} has {', '.join(list(table.q)[:8])}, the take {', '.join(median)}. "
-            "Name columns by segments or by sensor ids of this take.",
+            Message(
+                "{source} has {join}, the take {median}. Name columns by segments or by sensor ids "
+                "of this take.",
+                source=table.source,
+                join=", ".join(list(table.q)[:8]),
+                median=", ".join(median),
+            ),
         )
     lasts_s = float(table.t_s[-1] - table.t_s[0])
     if lasts_s > LONGEST_S:
         raise FormatError(
             "too_long",
-            f"{table.source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. "
-            "A column in ms or µs says so in its name: time_ms, time_us.",
+            Message(
+                "{source} lasts {lasts_s:.6g} s by its time; expected at most {LONGEST_S:g} s. A "
+                "column in ms or µs says so in its name: time_ms, time_us.",
+                source=table.source,
+                lasts_s=lasts_s,
+                LONGEST_S=LONGEST_S,
+            ),
         )
     if lasts_s < LEAST_OVERLAP_S:
         raise _too_short(table.source)
 
 
 def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
-    """What was fitted to lay the reference onto the take."""
+    """Notices on the fitted alignment of the reference."""
     return (
         Notice(
             "reference_lag",
-            f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {abs(lag_s):.3f} s, "
-            f"where the angular speeds correlate best ({correlation:.3f}).",
+            Message(
+                f"The reference's clock was moved {'back' if lag_s < 0.0 else 'on'} by {{lag_s:.3f}} "
+                "s, where the angular speeds correlate best ({correlation:.3f}).",
+                lag_s=abs(lag_s),
+                correlation=correlation,
+            ),
             severity="info",
         ),
         Notice(
@@ -136,7 +152,7 @@ def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
 
 
 def name_segments(table: OrientationTable, worn: Mapping[str, Segment | None]) -> dict[Segment, Floats]:
-    """Columns of the reference by segment, named by the segment or by the sensor worn there."""
+    """Columns of the reference by segment, named by the segment or by its sensor."""
     devices = {device.lower(): segment for device, segment in worn.items()}
     found: dict[Segment, Floats] = {}
     for name, q in table.q.items():
@@ -147,7 +163,9 @@ def name_segments(table: OrientationTable, worn: Mapping[str, Segment | None]) -
 
 
 def interpolate(t_new: Floats, t_s: Floats, q: Floats) -> Floats:
-    """Orientations (k, 4) at other times; NaN outside, and in gaps longer than 0.1 s or two samples."""
+    """Orientations (k, 4) at other times; NaN outside the range, and in gaps longer than 0.1 s or two
+    samples.
+    """
     known = np.isfinite(q[:, 0])
     t, x = t_s[known], q[known]
     out = np.full((len(t_new), 4), np.nan)
@@ -165,12 +183,12 @@ def interpolate(t_new: Floats, t_s: Floats, q: Floats) -> Floats:
 def find_lag(
     pairs: Sequence[tuple[Floats, Floats]], step_s: float, ahead_s: float, source: str
 ) -> tuple[float, float]:
-    """What to add to the reference's clock, s, and the correlation of the angular speeds there.
+    """Offset to add to the reference's clock, s, and the correlation of the angular speeds with it.
 
     Parameters
     ----------
-    pairs : by segment the speeds of the take (m,) and of the reference (k,), NaN where unknown, both every
-        `step_s`. ahead_s : how much later the take's first sample is by the two clocks.
+    pairs : by segment the speeds of the recording (m,) and of the reference (k,), NaN where unknown, both
+        every `step_s`. ahead_s : delay of the recording's first sample by the two clocks.
 
     Raises
     ------
@@ -200,8 +218,14 @@ def find_lag(
     if r[best] < LEAST_CORRELATION:
         raise FormatError(
             "other_movement",
-            f"{source} moves differently from the take: angular speeds correlate by {r[best]:.2f} at best, "
-            f"expected {LEAST_CORRELATION:g}. Is it of this take, and are the segments right?",
+            Message(
+                "{source} moves differently from the take: angular speeds correlate by {best:.2f} "
+                "at best, expected {LEAST_CORRELATION:g}. Is it of this take, and are the segments "
+                "right?",
+                source=source,
+                best=r[best],
+                LEAST_CORRELATION=LEAST_CORRELATION,
+            ),
         )
     a, b, c = r[max(best - 1, 0)], r[best], r[min(best + 1, len(r) - 1)]
     bend = a - 2.0 * b + c
@@ -211,15 +235,19 @@ def find_lag(
 def _too_short(source: str) -> FormatError:
     return FormatError(
         "no_overlap",
-        f"“{source}” and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+        Message(
+            "“{source}” and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+            source=source,
+            LEAST_OVERLAP_S=LEAST_OVERLAP_S,
+        ),
     )
 
 
 def fit_frames(reference: Floats, q: Floats) -> tuple[Floats, Floats]:
     """Constant rotations a, b (4,) with reference ≈ a ⊗ q ⊗ b over samples (k, 4), least squares of sines.
 
-    ⟨reference, a q b⟩ is linear in a bᵀ: the greatest eigenvector of its square is the start, and the
-    mean rotation (Markley 2007) of one given the other the rest, until they stay.
+    ⟨reference, a q b⟩ is linear in a bᵀ: the largest eigenvector of its square gives initial values, refined
+    by alternating mean rotations (Markley 2007) of one given the other until convergence.
     """
     basis = np.eye(4)
     parts = [(multiply(multiply(a, q), b) * reference).sum(axis=1) for a in basis for b in basis]
@@ -235,11 +263,12 @@ def fit_frames(reference: Floats, q: Floats) -> tuple[Floats, Floats]:
 def measure_reference_angles(
     q: Mapping[Segment, Floats], known: Mapping[Segment, Bools], zero_offset: Mapping[str, float]
 ) -> dict[str, Floats]:
-    """Joint angles (m,) of a placed reference from the take's own zero: it need not show the standing.
+    """Joint angles (m,) of an aligned reference with the zero of the recording, so it need not include
+    standing.
 
     Parameters
     ----------
-    zero_offset : angle → what is taken off, rad; others are left out.
+    zero_offset : angle → offset to subtract, rad; angles without one are omitted.
     """
     kernel = AngleKernel.between(tuple(q))
     zero = np.array([zero_offset.get(name, np.nan) for name in kernel.names])
@@ -250,7 +279,7 @@ def measure_reference_angles(
 def compare_by_bland_altman(
     name: str | None, quantity: str, value: Floats, reference: Floats
 ) -> BlandAltman | None:
-    """Differences of angles (m,) in rad where both are known; None with fewer than two."""
+    """Bland–Altman statistics of angles (m,) in rad where both are known; None with fewer than two."""
     known = np.isfinite(value) & np.isfinite(reference)
     if np.count_nonzero(known) < 2:
         return None
@@ -265,22 +294,22 @@ def compare_by_bland_altman(
 
 
 def lean_and_course(q: Floats) -> tuple[Floats, Floats]:
-    """Inclination of a segment's long axis (m,) and its course over the floor, rad; NaN where q is."""
+    """Inclination (m,) of a segment's long axis and its heading, rad; NaN where q is."""
     up = rotate(q, np.array([0.0, 1.0, 0.0]))[..., 2]
     return np.arccos(np.clip(up, -1.0, 1.0)), yaw(q)
 
 
 def _speed(q: Floats) -> Floats:
-    """Turn from sample to sample (m − 1,), rad."""
+    """Rotation angle between consecutive samples (m − 1,), rad."""
     return np.asarray(np.linalg.norm(log(multiply(conjugate(q[:-1]), q[1:])), axis=1))
 
 
 def _known(x: Floats) -> tuple[Floats, Floats]:
-    """The signal with unknown samples as zero, and where it is known as 1."""
+    """The signal with unknown samples set to zero, and its validity as 0 or 1."""
     known = np.isfinite(x)
     return np.where(known, x, 0.0), known.astype(np.float64)
 
 
 def _meet(a: Floats, b: Floats) -> Floats:
-    """Sums of products of two signals at every lag."""
+    """Cross-correlation sums of two signals at every lag."""
     return np.asarray(correlate(a, b, method="fft"))

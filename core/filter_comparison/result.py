@@ -1,4 +1,4 @@
-"""What a comparison of filters gives."""
+"""Result of a comparison of filters."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from sagittal.core.fusion.algorithms.choice import require_filters
 
 @dataclass(frozen=True)
 class FilterRequest:
-    """Which filters are run.
+    """Filters to run.
 
     Parameters
     ----------
     filters : names of `sagittal.core.fusion.algorithms.choice.LABELS`.
-    magnetometer : whether those that can, use one.
+    magnetometer : use it in filters that support one.
 
     Raises
     ------
-    ParameterError of `require_filters`.
+    ParameterError as `require_filters`.
     """
 
     filters: tuple[str, ...]
@@ -36,13 +36,13 @@ class FilterRequest:
 
 @dataclass(frozen=True)
 class FilterAgreement:
-    """One filter in the table, or the product's own chain (`name` None).
+    """One filter in the table, or the final orientations of the analysis (`name` None).
 
     Parameters
     ----------
-    cost_us : per sample and sensor; None = not measured. to_median, to_own : RMS over all segments against
-        the median of the filters, and against the product's own chain; None where it gave nothing.
-    segments : the same against the median, by segment. told : what went wrong, and on which segment.
+    cost_us : per sample and sensor; None = not measured. to_median, to_own : RMS over all segments relative
+        to the median of the filters, and to the analysis; None without a result.
+    segments : the same relative to the median, by segment. told : notices on failures, by segment.
     """
 
     name: str | None
@@ -56,14 +56,14 @@ class FilterAgreement:
 
 @dataclass(frozen=True, eq=False)
 class FilterSpread:
-    """How far the filters are apart in one quantity.
+    """Spread of the filters in one quantity.
 
     Parameters
     ----------
-    name : a joint angle, or `<segment>_inclination`, `<segment>_heading`. filters : how many are behind it.
-    sd, range : (m,) rad over the kept samples: standard deviation, and largest less smallest.
+    name : a joint angle, or `<segment>_inclination`, `<segment>_heading`. filters : their number. sd, range :
+        (m,) rad over the compared samples: standard deviation, and maximum minus minimum.
     cycle_sd : side → (101,) RMS of `sd` over the counted strides, by percent of the gait cycle.
-    stance, swing : side → RMS of `sd` in that phase, None where no foot-off is known.
+    stance, swing : side → RMS of `sd` in that phase, None without known foot-offs.
     """
 
     name: str
@@ -76,18 +76,18 @@ class FilterSpread:
 
     @property
     def rms(self) -> float:
-        """RMS of `sd` over the take, rad."""
+        """RMS of `sd` over the recording, rad."""
         return float(np.sqrt(np.nanmean(self.sd**2)))
 
 
 @dataclass(frozen=True, eq=False)
 class BlandAltman:
-    """Filter less reference, one quantity of one filter, rad (Bland and Altman 1986).
+    """Filter minus reference, one quantity of one filter, rad (Bland and Altman 1986).
 
     Parameters
     ----------
     bias : mean difference. low, high : limits of agreement, bias ∓ 1.96 SD over the samples. n : samples.
-    rmse : of the differences. middle, difference : (k,) points of the plot, taken evenly.
+    rmse : of the differences. middle, difference : (k,) evenly sampled points of the plot.
     """
 
     filter: str | None
@@ -103,13 +103,13 @@ class BlandAltman:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceScores:
-    """Every filter against an uploaded reference.
+    """Every filter compared with an uploaded reference.
 
     Parameters
     ----------
     lag_s : added to the reference's clock. correlation : of the angular speeds at that lag.
-    segments : those that both have. scores : filter (None: own chain) → segment → RMS errors.
-    agreement : in the order of filters and quantities. notices : how it was laid onto the take.
+    segments : the common ones. scores : filter (None: analysis) → segment → RMS errors. agreement : in the
+        order of filters and quantities. notices : on the alignment with the recording.
     """
 
     source: str
@@ -123,12 +123,12 @@ class ReferenceScores:
 
 @dataclass(frozen=True, eq=False)
 class FilterComparison:
-    """What `compare_filters` gives.
+    """Result of `compare_filters`.
 
     Parameters
     ----------
-    t_s : (m,) kept samples. segments : with a sensor. strides : side → counted ones.
-    orientations : filter (None: own chain) → segment → (m, 4) segment to W. valid : segment → (m,).
+    t_s : (m,) compared samples. segments : with a sensor. strides : side → counted ones.
+    orientations : filter (None: analysis) → segment → (m, 4) segment to W. valid : segment → (m,).
     """
 
     request: FilterRequest

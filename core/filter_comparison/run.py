@@ -1,11 +1,13 @@
-"""Any filter on the sensors of a calibrated take, so that all give the same thing: segment to W.
+"""Run any filter on the sensors of a calibrated recording, with the same kind of output: segment to W.
 
-Every filter starts in the middle of the calibration's zero window, at the tilt and the heading that the
-product has there, and runs from it to both ends of the take; backwards the rates are negated, which is the
-inverse motion. A constant turn about the vertical lays its world on W. What differs later, the filter did.
+Every filter starts in the middle of the calibration's zero window, with the tilt and heading of the analysis,
+and runs from there to both ends of the recording; backwards the rates are negated, which is the inverse
+motion. A constant rotation about the vertical aligns its world with W. All later differences are due to the
+filter.
 
-A published filter turns by a sample's rate from the sample before to this one. That rate is the mean of both,
-as the product takes it: by the later one alone all are ahead by half a sample, 1.5° at 300 °/s and 100 Hz.
+A published filter rotates by a sample's rate from the previous sample to this one. The rate passed in is the
+mean of both, as in the analysis: with the later one alone all filters lead by half a sample, 1.5° at 300 °/s
+and 100 Hz.
 """
 
 from __future__ import annotations
@@ -36,13 +38,13 @@ WARM_UP: Final = 50
 
 @dataclass(frozen=True, eq=False)
 class MountedSignals:
-    """One sensor as every filter gets it.
+    """Input of every filter for one sensor.
 
     Parameters
     ----------
     gyr, acc, mag : (n, 1, 3), NaN where the sensor was lost; mag None without a magnetometer. gyr is the rate
-        from the sample before to this one.
-    rest : what filters start from, in the middle `at` of the zero window. start : (4,) sensor to W there.
+        from the previous sample to this one. rest : initial data of the filters, in the middle `at` of the
+        zero window. start : (4,) sensor to W there.
     sensor_q : (4,) segment to sensor.
     """
 
@@ -57,7 +59,9 @@ class MountedSignals:
 
 @dataclass(frozen=True, eq=False)
 class FilterRun:
-    """One filter on all sensors: segment → (m, 4) segment to W on the kept samples, and what went wrong."""
+    """One filter on all sensors: segment → (m, 4) segment to W at the compared samples, and notices on
+    failures.
+    """
 
     q: Mapping[Segment, Floats]
     cost_us: float | None
@@ -67,11 +71,11 @@ class FilterRun:
 def prepare_signals(
     calibrated: CalibratedRecording, alone: Orientations, *, magnetometer: bool
 ) -> dict[Segment, MountedSignals]:
-    """Signals and start of every calibrated sensor.
+    """Signals and initial state of every calibrated sensor.
 
     Parameters
     ----------
-    alone : orientations of each sensor on its own, with the same mountings.
+    alone : orientations of each sensor independently, with the same alignment.
     """
     recording, zero = calibrated.recording, calibrated.calibration.zero
     window = index_window(zero, recording.rate_hz)
@@ -106,7 +110,7 @@ def run_filter(
     keep: slice,
     clock: Clock,
 ) -> FilterRun:
-    """Run one filter on every sensor; where it cannot, the notice of that segment says why.
+    """Run one filter on every sensor; failures are reported by a notice for the segment.
 
     Parameters
     ----------
@@ -132,7 +136,7 @@ def run_filter(
 
 
 def _orient_by_published(name: str, x: MountedSignals, rate_hz: float) -> Floats:
-    """Sensor to the filter's world (n, 4), from the middle of the rest to both ends."""
+    """Sensor to the filter's world frame (n, 4), from the middle of the rest to both ends."""
     out = np.empty((len(x.gyr), 4))
     later, before = slice(x.at + 1, None), slice(x.at - 1, None, -1)
     run = FusionFilter(name, rate_hz, x.rest)
@@ -148,13 +152,13 @@ def _orient_by_published(name: str, x: MountedSignals, rate_hz: float) -> Floats
 
 
 def _orient_by_own(name: str, x: MountedSignals, rate_hz: float) -> Floats:
-    """The same by the self-calibrating filter, which needs no rest."""
+    """The same with the self-calibrating filter, which needs no rest."""
     run = SelfCalibratingFilter(rate_hz, magnetometer=x.mag is not None)
     return np.asarray((run.smooth if BOTH_WAYS[name] else run.advance)(x.gyr, x.acc, x.mag)[:, 0])
 
 
 def _first(x: MountedSignals) -> MountedSignals:
-    """The first samples, started as the whole take is."""
+    """The first samples, with the initial state of the whole recording."""
     part = slice(0, WARM_UP)
     return replace(x, gyr=x.gyr[part], acc=x.acc[part], mag=_part(x.mag, part), at=0)
 
@@ -164,7 +168,7 @@ def _part(mag: Floats | None, part: slice) -> Floats | None:
 
 
 def _join(told: list[Notice], sensors: int) -> tuple[Notice, ...]:
-    """One notice for all segments where the same happened on each."""
+    """One notice for all segments with the same failure."""
     if len(told) == sensors and len({(n.code, n.message) for n in told}) == 1:
         return (Notice(told[0].code, told[0].message),)
     return tuple(told)

@@ -1,4 +1,4 @@
-"""How far filters are apart: over time, over the gait cycle, and each from their median."""
+"""Spread of the filters: over time, over the gait cycle, and of each from their median."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ from sagittal.core.rotation import conjugate, exp, log, multiply, split_heading,
 
 
 def find_median(q: Floats, near: Floats) -> Floats:
-    """Median orientation (m, 4) of filters (F, m, 4): of each axis of the turn from `near` (m, 4), in W."""
+    """Median orientation (m, 4) of filters (F, m, 4): per axis of the rotation from `near` (m, 4), in W."""
     apart = log(multiply(q, conjugate(near)))
     return multiply(exp(np.median(apart, axis=0)), near)
 
 
 def score_between(q: Floats, other: Floats, valid: Bools) -> OrientationScore | None:
-    """RMS of the turn between two orientations (m, 4) where valid (m,); None where nothing is."""
+    """RMS of the angle between two orientations (m, 4) where valid (m,); None without valid samples."""
     return score_error(multiply(other[valid], conjugate(q[valid]))) if valid.any() else None
 
 
 def pool_scores(scores: Sequence[OrientationScore]) -> OrientationScore | None:
-    """RMS over segments of the same number of samples; None without one."""
+    """RMS over segments with equal numbers of samples; None without any."""
     if not scores:
         return None
     means = [
@@ -60,7 +60,7 @@ def spread_of_segment(
 def spread_of_angles(
     angles: Sequence[Mapping[str, Floats]], near: Mapping[str, Floats]
 ) -> dict[str, tuple[Floats, Floats, int]]:
-    """Spread of joint angles between filters by name: SD, range (m,) in rad, and of how many filters."""
+    """Spread of joint angles between filters by name: SD, range (m,) in rad, and number of filters."""
     found = {}
     for name, own in near.items():
         rows = [wrap_angle(x[name] - own) for x in angles if name in x]
@@ -73,7 +73,7 @@ def spread_of_angles(
 def cut_into_cycles(
     name: str, filters: int, sd: Floats, reach: Floats, t_s: Floats, strides: Strides
 ) -> FilterSpread:
-    """A spread over time, and its RMS over the counted strides of the side it belongs to."""
+    """A spread over time, and its RMS over the counted strides of its side."""
     _, _, suffix = name.removesuffix("_inclination").removesuffix("_heading").rpartition("_")
     own = [side for side in SIDES if SUFFIX[side] == suffix]
     cycle: dict[Side, Floats] = {}
@@ -100,7 +100,7 @@ def _phase(sd: Floats, t_s: Floats, strides: Sequence[Stride], phase: str) -> fl
 
 
 def _square(sd: Floats, t_s: Floats, bounds: Sequence[tuple[float, float]]) -> Floats | None:
-    """Mean square (101,) over pieces of a signal; None where no piece is known throughout."""
+    """Mean square (101,) over segments of a signal; None if no segment is completely known."""
     if not bounds:
         return None
     rows = resample(sd[None], t_s, np.array(bounds), POINTS)[0]
@@ -115,5 +115,5 @@ minutes are 0.5 GB in full. A filter itself sees every sample."""
 
 
 def choose_samples(n: int, rate_hz: float) -> slice:
-    """Which of n samples are kept to compare filters on."""
+    """Which of n samples are used to compare filters."""
     return slice(0, n, max(1, round(rate_hz / KEPT_HZ), -(-n // MOST_SAMPLES)))

@@ -1,7 +1,7 @@
-"""Clinical flags: measured values against limits and where the limits come from (docs/science/flags.md).
+"""Clinical flags: measured values compared with published limits (docs/science/flags.md).
 
-A flag says "swing peak of the left knee 38°, limit 44.3°", never what a person has. Limits on the level of an
-angle need the anatomical level: without goniometer angles the standing posture would decide them.
+A flag states "swing peak of the left knee 38°, limit 44.3°", never a diagnosis. Limits on the absolute level
+of an angle require the anatomical zero: without goniometer angles the standing posture would decide them.
 """
 
 from sagittal.core.flags.judge import Flag, judge_flags

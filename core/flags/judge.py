@@ -1,4 +1,4 @@
-"""Session values → flags: each value against its limit, or why it cannot be held against it."""
+"""Session values → flags: each value compared with its limit, or the reason why it cannot be compared."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from sagittal.core.events.result import COMPARED
 from sagittal.core.flags.rules import CURVES, RULES, SWING_TO_STANCE, Beyond, Kind, Rule
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.lookup import Norms, look_up_norms
 from sagittal.core.norms.tables import wbds_group
 from sagittal.core.parameters.anatomical_zero import anatomical_curves
@@ -30,24 +31,25 @@ SMALLEST: Final = 1e-6
 
 @dataclass(frozen=True)
 class Flag:
-    """One rule on one side: a value against a limit, never what a person has.
+    """One rule applied to one side: a value against a limit, never a diagnosis.
 
     Parameters
     ----------
-    side : of the value; of a ratio the side that is larger, None where there is no ratio.
+    side : side of the value; for a ratio the larger side, None without a ratio.
     value, unit : measured, mean over `n` counted strides. limit, beyond : exceeded when above or below it.
-    exceeded : None where it cannot be said, then `reason`: "angle_zero_standing" (the level needs
-        goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no own control group has
-        the measure), "no_norm_for_age", "no_speed_matched_norm" (the limit is of healthy adults, of whom none
-        walked at this speed), "side_missing", "too_few_strides", "sides_alike" (beyond the limit,
-        but the strides do not say that the sides differ), or the parameter's own.
-    marked : beyond the second, stronger limit too.
-    zero : what an angle is measured from, None where its zero does not matter.
-    source : of the limit. verified : False = to be shown as "unverified cut-off".
-    note : "sides_stand_differently": the difference of two angles from standing contains that of the posture.
-    spread : sd of healthy people behind the limit, None where it is no such.
-    certain : the value is beyond its limit by more than its strides and its measurement leave open (95 %);
-        False where that is not known.
+    exceeded : None if undecided, with `reason`: "angle_zero_standing" (the level needs
+        goniometer angles), "joint_missing", "no_strides", "gap", "no_controls" (no control group of the
+        clinic has the measure), "no_norm_for_age", "no_speed_matched_norm" (the limit comes from healthy
+        adults, none of whom walked at this speed), "side_missing", "too_few_strides", "sides_alike" (limit
+        exceeded, but the sides do not differ significantly), or the reason of the parameter.
+    marked : the second, stricter limit is exceeded too.
+    zero : zero of an angle, None if it does not matter.
+    source : reference of the limit. verified : False = displayed as "unverified cut-off".
+    note : "sides_stand_differently": the difference of two angles relative to standing includes the asymmetry
+    of the standing posture.
+    spread : sd of the healthy sample the limit is based on, None for other limits.
+    certain : the limit is exceeded by more than the 95 % uncertainty from strides and measurement; False if
+    unknown.
     """
 
     name: str
@@ -81,7 +83,7 @@ class _Value:
 
 @dataclass(frozen=True)
 class _Values:
-    """What was measured, by measure and side: parameters, angles from standing, anatomical angles."""
+    """Measured values by measure and side: parameters, angles relative to standing, anatomical angles."""
 
     plain: Mapping[tuple[str, Side], _Value]
     standing: Mapping[tuple[str, Side], _Value] = field(default_factory=dict)
@@ -96,19 +98,19 @@ def judge_flags(
     controls: Norms | None = None,
     age: float | None = None,
 ) -> tuple[Flag, ...]:
-    """Hold every rule against both sides.
+    """Apply every rule to both sides.
 
     Parameters
     ----------
-    curves : from standing; None without joint angles. parameters : of the session.
+    curves : relative to standing; None without joint angles. parameters : of the session.
     standing_deg : goniometer angles in standing (`sagittal.core.subject.standing_angles`).
-    height_m : m, makes speed dimensionless.
-    controls : own control group (`ControlGroup.norms`) for rules whose limit is theirs.
-    age : years; below 18 limits made of the adult norms are not held against anybody. None = an adult.
+    height_m : m, for the dimensionless speed.
+    controls : the clinic's control group (`ControlGroup.norms`), for rules with limits based on it.
+    age : years; limits based on adult norms are not applied below 18. None = adult.
 
     Returns
     -------
-    one flag per rule and side in the order of `RULES`, one per rule for ratios.
+    One flag per rule and side in the order of `RULES`; one per rule for ratios.
     """
     found = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
@@ -156,7 +158,7 @@ _JUDGED: Final = {rule.measure: CURVES[rule.measure] for rule in RULES if rule.m
 
 
 def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
-    """Mean over the counted strides of what rules read."""
+    """Means over the counted strides of the curve parameters used by the rules."""
     found: dict[tuple[str, Side], _Value] = {}
     for name, sides in stride_figures(curves, _JUDGED).items():
         level = CURVES[name].statistic != "range"
@@ -175,7 +177,7 @@ def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
 
 
 def _own(figure: CurveFigure) -> float:
-    """What one side of a figure is known to in a take, degrees; 0 where nobody has measured it."""
+    """Systematic error of one side of a curve parameter, degrees; 0 if never determined."""
     known = LEVELS.get(figure.variable)
     if known is None:
         return 0.0
@@ -185,8 +187,8 @@ def _own(figure: CurveFigure) -> float:
 def _at_speed(rule: Rule, adults: Norms) -> Rule:
     """The rule with the limits of healthy adults at the speed of these norms.
 
-    Where no adult walked at it, a limit of theirs is kept for `judge_flags` to withdraw, and a second one is
-    dropped. What healthy sides differ by does not depend on the speed.
+    If no adult walked at that speed, a primary limit is kept for `judge_flags` to withdraw, and a second one
+    is dropped. Limits on side differences do not depend on the speed.
     """
     if rule.adults is None or rule.kind == "difference":
         return rule
@@ -196,11 +198,15 @@ def _at_speed(rule: Rule, adults: Norms) -> Rule:
     beyond = norm.mean + (2.0 if rule.beyond == "above" else -2.0) * norm.sd
     if rule.adults == "marked":
         return replace(rule, marked=beyond)
-    return replace(rule, limit=beyond, spread=norm.sd, source=f"mean + 2 SD, {norm.source}")
+    return replace(
+        rule, limit=beyond, spread=norm.sd, source=Message("mean + 2 SD, {source}", source=norm.source)
+    )
 
 
 def _with_limit(rule: Rule, controls: Norms | None) -> Rule:
-    """The rule with the limit of the own controls, where it has none and they know the measure."""
+    """The rule with the limit of the clinic's controls, if it has no limit and the controls include the
+    measure.
+    """
     if rule.limit is not None or controls is None or rule.measure not in controls.values:
         return rule
     norm = controls.values[rule.measure]
@@ -209,7 +215,7 @@ def _with_limit(rule: Rule, controls: Norms | None) -> Rule:
 
 
 def _level(rule: Rule, side: Side, found: _Values) -> Flag:
-    """A value of one side."""
+    """Flag on the value of one side."""
     key = rule.measure, side
     if rule.measure not in CURVES:
         return _flag(rule, side, found.plain.get(key) or _Value(None, 0, "no_strides"), None)
@@ -223,7 +229,7 @@ def _level(rule: Rule, side: Side, found: _Values) -> Flag:
 
 
 def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
-    """Other side minus this side, both from the same zero."""
+    """Flag on the other side minus this side, both relative to the same zero."""
     own, other = (rule.measure, side), (rule.measure, OTHER[side])
     free = CURVES[rule.measure].statistic == "range"
     both = own in found.anatomical and other in found.anatomical
@@ -239,7 +245,7 @@ def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
 
 
 def _ratio(rule: Rule, found: _Values) -> Flag:
-    """Larger side over smaller side; the flag belongs to the larger."""
+    """Flag on the larger side over the smaller side; it is assigned to the larger."""
     left, right = (found.plain.get((rule.measure, s)) or _Value(None, 0, "no_strides") for s in SIDES)
     if left.mean is None or right.mean is None:
         why = left.reason if left.mean is None else right.reason
@@ -252,7 +258,7 @@ def _ratio(rule: Rule, found: _Values) -> Flag:
 
 
 def _clear(flag: Flag, a: _Value, b: _Value) -> Flag:
-    """Sides whose strides overlap so far that either may be the larger are not beyond anything."""
+    """Withdraw a flag if the strides of the two sides overlap so far that either could be the larger."""
     if not flag.exceeded or a.mean is None or b.mean is None:
         return flag
     if differ(Spread(a.mean, a.sd, a.n, a.own), Spread(b.mean, b.sd, b.n, b.own)):
@@ -292,7 +298,7 @@ def _flag(rule: Rule, side: Side | None, value: _Value, zero: Zero | None) -> Fl
 
 
 def _is_certain(value: _Value, limit: float | None) -> bool:
-    """The 95 % interval of a value leaves its limit out."""
+    """Whether the 95 % interval of a value excludes its limit."""
     if value.mean is None or value.sd is None or limit is None:
         return False
     return abs(value.mean - limit) > NORMAL_95 * hypot(value.sd / sqrt(value.n), value.own)

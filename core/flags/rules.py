@@ -1,7 +1,7 @@
-"""Limits that values are held against, each with its source (docs/science/flags.md, "Rules").
+"""Limits for measured values, each with its source (docs/science/flags.md, "Rules").
 
-A limit nobody of us has read in its source is kept and marked unverified. Not here:
-hip abduction as a sign of circumduction (it stays normal when the pelvis is hiked; the foot's path shows it).
+A limit that we have not been able to read in its source is kept and marked unverified. Deliberately excluded:
+hip abduction as a sign of circumduction (it stays normal with pelvic hiking; the foot path shows it).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from sagittal.core.message import Message
 from sagittal.core.norms.tables import WBDS, read_rows
 from sagittal.core.norms.values import single_side_sd
 from sagittal.core.parameters.catalogue import LIMIT_FIGURES, CurveFigure, list_curve_figures, require_entries
@@ -20,18 +21,18 @@ Beyond = Literal["above", "below"]
 
 @dataclass(frozen=True)
 class Rule:
-    """When a value is beyond its limit.
+    """When a value exceeds its limit.
 
     Parameters
     ----------
     measure : name in the catalogue.
     kind : "value"; "difference" = other side − this side; "ratio" = larger side over smaller side.
-    limit : None = mean ± twice the sd of the clinic's own controls. marked : a second, stronger limit.
-    level : the value means nothing without the anatomical zero.
-    verified : False = "unverified cut-off": seen in the literature, not read in its source.
-    spread : sd of healthy people behind the limit, in its unit; None where the limit is no such.
+    limit : None = mean ± 2 sd of the clinic's own controls. marked : a second, stricter limit.
+    level : the value is meaningless without the anatomical zero.
+    verified : False = "unverified cut-off": cited in the literature, original source not read.
+    spread : sd of the healthy sample the limit is based on, in its unit; None for other limits.
     adults : which limit comes from the healthy adults of the angle norms: "limit", or "marked" alone; None =
-        neither. Here it is that of their comfortable speed, `judge_flags` takes it at the person's.
+    neither. The value here is for their comfortable speed; `judge_flags` uses the person's speed.
     """
 
     name: str
@@ -91,7 +92,7 @@ def _below_norm(parameter: str) -> float:
 
 def _apart(joint: str, variable: str, parameter: str) -> Rule:
     limit = 2.0 * _wbds(parameter)[2]
-    source = f"2 SD of left − right, {WBDS}"
+    source = Message("2 SD of left − right, {WBDS}", WBDS=WBDS)
     return Rule(
         f"{joint}_range_asymmetry", f"{variable}_rom_deg", "difference", "above", limit, source,
         adults="limit",
@@ -108,7 +109,7 @@ RULES: Final[tuple[Rule, ...]] = (
         beyond="below",
         # not 0°: 45 % of healthy sides pass it, as the zero of a knee depends on the protocol by 5°
         limit=-5.0,
-        source=f"{_PRACTICE}; second limit: mean − 2 SD of healthy adults",
+        source=Message("{PRACTICE}; second limit: mean − 2 SD of healthy adults", PRACTICE=_PRACTICE),
         marked=_below_norm("knee_min_stance(20-60%)"),
         level=True,
         verified=False,
@@ -150,7 +151,7 @@ Ambulation = Literal["household", "limited_community", "community"]
 
 
 def classify_ambulation(speed_mps: float) -> Ambulation:
-    """Class of walking after stroke: below 0.4, to 0.8, above 0.8 m/s."""
+    """Ambulation class after stroke: below 0.4, up to 0.8, above 0.8 m/s."""
     if speed_mps < PERRY_MPS[0]:
         return "household"
     return "limited_community" if speed_mps <= PERRY_MPS[1] else "community"

@@ -1,4 +1,4 @@
-"""What a file is, decided by its content, never by its name."""
+"""File type detection by content, never by name."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ _TABLE: Final = (
 
 
 def advise(what: str) -> str:
-    """What to do with a known format that is not read."""
+    """Advice for a recognised format that is not supported."""
     return _ADVICE.get(what, _TABLE)
 
 
 def sniff(data: bytes) -> tuple[Kind, str]:
-    """Kind of a file and its name for people.
+    """File kind and its display name.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def _sniff_json(data: bytes) -> tuple[Kind, str]:
 
 
 def _is_table(data: bytes) -> bool:
-    """Tell a table by two neighbouring rows with the same number of at least four numbers."""
+    """Whether there are two adjacent rows with the same number of at least four numeric cells."""
     rows = [r for r in text.head_lines(data, 30) if r.strip()]
     for a, b in pairwise(rows):
         for separator in text.SEPARATORS:

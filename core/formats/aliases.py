@@ -1,4 +1,4 @@
-"""What vendors and laboratories call the segments, and how file names say them."""
+"""Segment names used by vendors and laboratories, also in file names."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _FILLER: Final = re.compile(r"(imu|sensor)$")
 
 
 def segment_named(name: str) -> Segment | None:
-    """Segment of a name or alias ("tibia_r_imu", "RightLowerLeg", "Left Foot", "LTibia"), else None."""
+    """Segment for a name or alias ("tibia_r_imu", "RightLowerLeg", "Left Foot", "LTibia"), else None."""
     if name in SEGMENTS:
         return name
     flat = _FILLER.sub("", re.sub(r"[\s_\-./]+", "", name).lower())
@@ -37,13 +37,13 @@ def segment_named(name: str) -> Segment | None:
 
 
 def side_in(text: str) -> str | None:
-    """Side, "l" or "r", that a name speaks of; None if none or both."""
+    """Side, "l" or "r", named in a text; None if none or both."""
     found = {_SIDE[word] for word in re.split(r"[\s_\-./]+", text.lower()) if word in _SIDE}
     return found.pop() if len(found) == 1 else None
 
 
 def segment_in(text: str) -> Segment | None:
-    """Segment that a file name or a column label speaks of, None if none or more than one."""
+    """Segment named in a file name or column label, None if none or more than one."""
     stem = re.sub(
         r"\.(txt|csv|tsv|gz|parquet)$", "", text.replace("\\", "/").rsplit("/", 1)[-1], flags=re.IGNORECASE
     )

@@ -1,8 +1,8 @@
-"""Zip and gzip opened in memory, within limits that are checked against real bytes.
+"""Zip and gzip expansion in memory, within limits checked against the actual bytes.
 
-The directory of a zip may lie, so the declared sizes are checked before anything is unpacked and no member
-may give more than it declared. Limits: docs/reference/formats.md, "Limits" (entries, total, ratio 100, no
-nesting, no absolute or parent paths, no links, no encryption).
+The directory of a zip may be false, so the declared sizes are checked before anything is unpacked and no
+member may exceed its declared size. Limits: docs/reference/formats.md, "Limits" (entries, total, ratio 100,
+no nesting, no absolute or parent paths, no links, no encryption).
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ _RATIO_FLOOR = 1 << 20
 
 @dataclass(frozen=True)
 class ArchiveLimits:
-    """What an archive may unpack to (docs/reference/formats.md, "Limits"; 1 GB holds 7 sensors × 4 h × 100 Hz
+    """Limits of unpacked archives (docs/reference/formats.md, "Limits"; 1 GB holds 7 sensors × 4 h × 100 Hz
     as text).
 
     Parameters
@@ -66,22 +66,21 @@ class ArchiveLimits:
 
 
 def is_zip(head: bytes | bytearray) -> bool:
-    """Tell a zip by its first four bytes."""
+    """Whether the first four bytes are those of a zip."""
     return head[:4] in ZIP_MAGIC
 
 
 def is_gzip(head: bytes | bytearray) -> bool:
-    """Tell a gzip by its first two bytes."""
+    """Whether the first two bytes are those of a gzip."""
     return head[:2] == GZIP_MAGIC
 
 
 def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> list[SourceFile]:
-    """Replace every zip by its members and every gzip by its content; other files pass unread.
+    """Replace every zip by its members and every gzip by its content; other files are passed through unread.
 
     Raises
     ------
-    ArchiveError
-        zip_bomb, zip_traversal, zip_link, zip_nested, zip_encrypted, zip_bad.
+    ArchiveError zip_bomb, zip_traversal, zip_link, zip_nested, zip_encrypted, zip_bad.
     """
     limits = limits or ArchiveLimits()
     out: list[SourceFile] = []
@@ -106,7 +105,7 @@ def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> 
 
 
 def _looks_packed(file: SourceFile) -> bool:
-    """Everything but the plainest names is looked into: content decides, the name only saves a read."""
+    """Whether a file must be inspected: content decides, only unambiguous names avoid the read."""
     return not file.name.lower().endswith((".txt", ".csv", ".tsv", ".json", ".parquet", ".xml", ".md"))
 
 
@@ -147,7 +146,7 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
 
 
 def read_episode_config(files: Iterable[SourceFile]) -> bytes | None:
-    """The settings with which the archive of a visit was analysed, as JSON; None where there is no archive.
+    """Analysis settings from the archive of a visit, as JSON; None without an archive.
 
     Raises
     ------
@@ -204,7 +203,7 @@ def _check_ratio(name: str, unpacked: int, packed: int, limits: ArchiveLimits) -
 
 @dataclass(frozen=True, eq=False)
 class _MemberReader:
-    """Unpacks one member; refuses more bytes than its directory entry declared."""
+    """Unpacks one member; rejects more bytes than its directory entry declared."""
 
     name: str
     archive: zipfile.ZipFile
@@ -233,7 +232,7 @@ class _MemberReader:
 
 
 def _unpacked(name: str, data: bytes, limits: ArchiveLimits) -> SourceFile:
-    """Unpack a gzip, all its members, counting what comes out."""
+    """Unpack a gzip with all its members, counting the output."""
     out = bytearray()
     rest = data
     try:

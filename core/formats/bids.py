@@ -1,8 +1,7 @@
-"""BIDS motion (BIDS 1.10, "Motion"): a table without a header and the files beside it that name its columns.
+"""BIDS motion (BIDS 1.10, "Motion"): a table without header, with sidecar files that name its columns.
 
-`…_channels.tsv` says for every column what it measures, of which tracked point and in which unit;
-`…_motion.json` the rate. Both become an entry of `sources` for `…_motion.tsv`, which is then
-read as any described table.
+`…_channels.tsv` lists for every column the quantity, the tracked point and the unit; `…_motion.json` the
+rate. Both become an entry of `sources` for `…_motion.tsv`, which is then read like any described table.
 """
 
 from __future__ import annotations
@@ -30,31 +29,33 @@ _MOST_COLUMNS: Final = 4096
 
 @dataclass(frozen=True)
 class BidsTable:
-    """How one table is read, and which tracked point is worn where as its name or placement says."""
+    """Specification of one table, and the segments of its tracked points according to their name or
+    placement.
+    """
 
     spec: SourceSpec
     worn: Mapping[str, Segment | None]
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell a list of channels by its header."""
+    """Whether a header is that of a channel list."""
     names = text.split(text.head_lines(data[:4096], 1)[0], b"\t") if data.strip() else []
     return {"name", "component", "type", "tracked_point", "units"} <= set(names)
 
 
 def is_table(name: str) -> bool:
-    """Tell the table by its name, the only thing that BIDS gives it."""
+    """Whether a file is the table, by its name, the only criterion in BIDS."""
     return name.lower().endswith(_MOTION)
 
 
 def find_parts(name: str) -> tuple[str, str]:
-    """Names of the channels and of the sidecar that belong to a table."""
+    """Names of the channel list and the sidecar of a table."""
     stem = name[: -len(_MOTION)]
     return f"{stem}{_CHANNELS}", f"{stem}{_SIDECAR}"
 
 
 def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | None) -> BidsTable:
-    """How the table `name`, which begins with `head`, is read.
+    """Specification of the table `name`, which begins with `head`.
 
     Raises
     ------
@@ -154,7 +155,7 @@ def _unit(said: str, known: Mapping[str, float], name: str) -> str:
 
 
 def _rate(sidecar: bytes | None, rows: Sequence[Mapping[str, str]], name: str) -> float:
-    """What the sidecar says it came to, else what was set, else what the channels say."""
+    """Effective rate from the sidecar, else its nominal rate, else that of the channels."""
     said: Any = {}
     with suppress(ValueError):
         said = read_json(sidecar or b"{}")

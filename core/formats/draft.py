@@ -1,7 +1,8 @@
-"""Between a file and a stream: signals in SI units whose common time origin is not known yet.
+"""Intermediate form between a file and a stream: SI units, common time origin not yet known.
 
-A packet counter says when a sample was taken only relative to the counters of the other sensors of the take
-(they wrap at 16 bit and may start on both sides of the wrap), so time is made for all files together.
+A packet counter gives the time of a sample only relative to the counters of the other sensors of the
+recording (they wrap at 16 bit and may start on both sides of the wrap), so times are assigned for all files
+together.
 """
 
 from __future__ import annotations
@@ -43,11 +44,11 @@ class Draft:
 
     Parameters
     ----------
-    clock : what `ticks` (n,) are: "counter" packet counter as written, "device" seconds, "index" row number.
+    clock : kind of `ticks` (n,): "counter" packet counter as written, "device" seconds, "index" row number.
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
-    rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
-        never does, a counter at 16 bit, or 32 when it shows more.
-    segment : where it is worn, as the file says it; None = it does not.
+    rate_hz : None = not in the file. wrap : tick at which the clock wraps; None = never for a device clock,
+        at 16 bit for a counter, or at 32 if it has larger values.
+    segment : placement given in the file; None = not given.
     """
 
     device_id: str
@@ -79,7 +80,7 @@ def make_draft(
     wrap: float | None = None,
     segment: Segment | None = None,
 ) -> Draft:
-    """A sensor as its file gives it; a signal without a single number is none, and a gyroscope is missed.
+    """Draft of one sensor; a signal without any number is absent, and a missing gyroscope gives a notice.
 
     Raises
     ------
@@ -106,12 +107,11 @@ def make_draft(
 
 
 def finish(drafts: Sequence[Draft]) -> dict[str, ImuStream]:
-    """Give all drafts of a take one time origin per clock.
+    """Convert all drafts of a recording to one time origin per clock.
 
     Raises
     ------
-    FormatError
-        duplicate_device (two different files of one sensor), counter_restart, empty.
+    FormatError duplicate_device (two different files of one sensor), counter_restart, empty.
     """
     drafts = _without_second_copies([_with_rate(d, drafts) for d in drafts])
     streams: dict[str, ImuStream] = {}
@@ -133,7 +133,9 @@ def _rate(d: Draft) -> float:
 
 
 def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
-    """Fill a rate the file does not name: from its clock, from the other sensors of the take, else say so."""
+    """Add a rate missing in a file: from its clock, else from the other sensors of the recording, else a
+    notice.
+    """
     if d.rate_hz is not None:
         return d
     ticks = d.ticks[np.isfinite(d.ticks)]
@@ -162,7 +164,7 @@ def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
 
 
 def _without_second_copies(drafts: Sequence[Draft]) -> list[Draft]:
-    """Drop a file that was given twice; refuse two different takes of one sensor."""
+    """Drop a file given twice; reject two different recordings of one sensor."""
     kept: dict[str, Draft] = {}
     for d in drafts:
         other = kept.get(d.device_id)
@@ -240,27 +242,28 @@ def _in_order(d: Draft) -> Draft:
 
 
 def grade_loss(lost: int, rows: int) -> Severity:
-    """Severity of rows that a file lost: information up to `FEW_ROWS`, a warning beyond."""
+    """Severity of lost rows in a file: information up to `FEW_ROWS`, a warning above."""
     return "info" if lost <= FEW_ROWS * rows else "warning"
 
 
 def _wrap(d: Draft, ticks: Floats) -> float:
-    """Range of the counter: as declared, else 16 bit as in Xsens exports, unless it shows a larger value."""
+    """Range of the counter: as declared, else 16 bit as in Xsens exports, unless it has larger values."""
     if d.wrap is not None:
         return d.wrap
     return WRAP_16 if not len(ticks) or ticks.max() < WRAP_16 else WRAP_32
 
 
 def _unwrapped(ticks: Floats, wrap: float) -> Floats:
-    """Counter without wraps: steps are taken modulo its range, to the nearer side."""
+    """Unwrapped counter: steps modulo its range, taken to the nearer side."""
     step = np.mod(np.diff(ticks) + wrap / 2, wrap) - wrap / 2
     return np.concatenate((ticks[:1], ticks[:1] + np.cumsum(step)))
 
 
 def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
-    """Shift whole wraps so that all sensors start within half a wrap of each other.
+    """Shift by whole wraps so that all sensors start within half a wrap of each other.
 
-    A sensor at another rate than most counts other packets; its time cannot be compared and this is an error.
+    A sensor with a rate different from the majority counts different packets; its time is not comparable,
+    which is an error.
     """
     rate = Counter(_rate(d) for d in group).most_common(1)[0][0]
     start = float(group[0].ticks[0])
@@ -282,25 +285,25 @@ def _shared_counter(group: Sequence[Draft]) -> list[Draft]:
 
 
 def _near(group: Sequence[Draft], start: float) -> list[Draft]:
-    """Device clocks that wrap, so that all start within half a turn of each other."""
+    """Device clocks that wrap, shifted so that all start within half a period of each other."""
     return [_turned(d, start, d.wrap) if d.wrap else d for d in group]
 
 
 def _turned(d: Draft, start: float, wrap: float) -> Draft:
-    """The same with whole turns of its clock added, nearest to `start`."""
+    """The draft shifted by whole periods of its clock, as close as possible to `start`."""
     return replace(d, ticks=d.ticks + np.round((start - float(d.ticks[0])) / wrap) * wrap)
 
 
 def digest(d: Draft) -> str:
-    """Of the signals in single precision, so that a stored and re-read stream keeps its digest."""
+    """Digest of the signals in single precision, so that a stored and reread stream has the same digest."""
     return signal_digest(d.acc, d.gyr, d.mag)
 
 
 def signal_digest(acc: Floats, gyr: Floats | None, mag: Floats | None) -> str:
-    """What tells the samples of one sensor from those of another, (n, 3) each, for `digest`.
+    """Fingerprint of the samples of one sensor, (n, 3) each, for `digest`.
 
-    SHA-256 over weighted sums of `_SUMMED` words of 64 bits, in a quarter of the time that it takes over the
-    words. Who wants to can make two takes with one digest; a copy is found by it, nothing is secured.
+    SHA-256 over weighted sums of `_SUMMED` words of 64 bits, four times as fast as over the words themselves.
+    Collisions can be constructed deliberately; it serves to detect copies, not for security.
     """
     h = hashlib.sha256()
     for name, a in (("acc", acc), ("gyr", gyr), ("mag", mag)):

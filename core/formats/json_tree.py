@@ -1,7 +1,7 @@
-"""JSON from outside: read by one strict rule, and a tree whose nodes know their own path.
+"""External JSON: a single strict reader, and a tree whose nodes know their own path.
 
-`read_json` reads every JSON text that comes from a person, a device or a file that others may have written:
-bodies of requests, live messages, manifests, notes on the disk.
+`read_json` reads every JSON text from users, devices or files of external origin: request bodies, live
+messages, manifests, stored notes.
 """
 
 from __future__ import annotations
@@ -23,19 +23,18 @@ MOST_SHOWN: Final = 40
 
 
 def read_json(data: bytes | str, most_bytes: int | None = None) -> object:
-    """Read a JSON text (RFC 8259) by the strict rule.
+    """Parse a JSON text (RFC 8259) strictly.
 
-    UTF-8, with or without a byte order mark; no key twice in an object; every number finite; every text valid
+    UTF-8, with or without a byte order mark; no duplicate keys; every number finite; every text valid
     Unicode, no lone surrogates; at most MOST_DEPTH levels.
 
     Parameters
     ----------
-    most_bytes : bytes of `data` (characters of a str) at most; None where the caller has bounded it.
+    most_bytes : maximum number of bytes of `data` (characters of a str); None if the caller has limited it.
 
     Raises
     ------
-    ValueError
-        what is wrong, in words that complete "The … is not valid JSON: ".
+    ValueError the reason, worded to complete "The … is not valid JSON: ".
     """
     if most_bytes is not None and len(data) > most_bytes:
         raise ValueError(f"it has {len(data)} bytes, at most {most_bytes} are read")
@@ -72,17 +71,18 @@ def _make_object(pairs: list[tuple[str, object]]) -> dict[str, object]:
 
 
 def _shorten_key(key: str) -> str:
-    """Return a key from outside as a sentence may show it: valid Unicode, MOST_SHOWN characters at most."""
+    """An external key in displayable form: valid Unicode, at most MOST_SHOWN characters."""
     shown = key.encode("utf-8", "backslashreplace").decode()
     return shown if len(shown) <= MOST_SHOWN else f"{shown[:MOST_SHOWN]}…"
 
 
 def _check_values(root: object, *, has_surrogates: bool) -> None:
-    """Refuse what Python reads but is not JSON: numbers beyond a float, lone surrogates; and great depth.
+    """Reject values that Python accepts but JSON does not: numbers out of range, lone surrogates; and
+    excessive depth.
 
     Parameters
     ----------
-    has_surrogates : whether there may be any.
+    has_surrogates : whether the text may contain any.
     """
     level: list[object] = [[root]]
     for _ in range(MOST_DEPTH + 1):
@@ -111,7 +111,7 @@ def _too_deep() -> ValueError:
 
 
 class JsonNode:
-    """One place in the JSON tree that knows its own path."""
+    """A node of the JSON tree that knows its own path."""
 
     def __init__(self, value: object, path: str) -> None:
         if value is not None and not isinstance(value, dict):
@@ -131,7 +131,7 @@ class JsonNode:
         return f"{self.path}.{key}" if self.path else key
 
     def only(self, *allowed: str) -> None:
-        """Refuse keys that are not allowed, with the nearest that is."""
+        """Reject keys that are not allowed, suggesting the nearest allowed one."""
         for key in self.value:
             if key not in allowed:
                 near = difflib.get_close_matches(key, allowed, 1)
@@ -150,21 +150,21 @@ class JsonNode:
         return [JsonNode(v, f"{self.at(key)}[{i}]") for i, v in enumerate(value or [])]
 
     def text(self, key: str) -> str | None:
-        """Read text, or None."""
+        """A text, or None."""
         value = self.value.get(key)
         if value is not None and (not isinstance(value, str) or not value.strip()):
             raise self._wrong(key, "a text")
         return value
 
     def string(self, key: str) -> str:
-        """Text that must be there."""
+        """A required text."""
         value = self.text(key)
         if value is None:
             raise self._wrong(key, "a text")
         return value
 
     def number(self, key: str) -> float | None:
-        """Read a finite number, or None."""
+        """A finite number, or None."""
         value = self.value.get(key)
         if value is None:
             return None
@@ -180,14 +180,14 @@ class JsonNode:
         return value
 
     def flag(self, key: str) -> bool | None:
-        """Read true or false, or None."""
+        """A boolean, or None."""
         value = self.value.get(key)
         if value is not None and not isinstance(value, bool):
             raise self._wrong(key, "true or false")
         return value
 
     def choice(self, key: str, allowed: tuple[str, ...], code: str) -> str | None:
-        """One of the allowed texts or None; `code` names the mistake."""
+        """One of the allowed texts or None; `code` is that of the error."""
         value = self.value.get(key)
         if value is not None and not isinstance(value, str):
             raise self._wrong(key, "a text")

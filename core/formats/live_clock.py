@@ -1,9 +1,9 @@
-"""One time for the streams of a live take: the same rule while it runs and when its log is read.
+"""Common time of the streams of a live recording: the same rule while it runs and when its log is read.
 
-Streams on the shared clock tick together. A stream on its own clock says nothing about when its samples were
-taken but when they were sent: the smallest (sent − sampled) of its first second is taken for the way every
-sample goes, as the least delayed batch bounds it best. What the way itself takes (some 10 ms by Bluetooth)
-stays in, equally in all streams of a kind.
+Streams on the shared clock tick together. For a stream on its own clock only the sending time of its samples
+is known: the smallest (sent − sampled) of its first second is taken as the delay of all its samples, since
+the batch with the least delay bounds it best. The transmission delay itself (some 10 ms by Bluetooth)
+remains, equally in all streams of a kind.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Micros = NDArray[np.int64]
 
 
 def sample_times_us(batch: SampleBatch, rate_hz: float) -> Micros:
-    """Device clock (n,) of a batch's samples: by its offsets, else evenly by the stream's rate."""
+    """Device time (n,) of a batch's samples: from its offsets, else evenly spaced by the stream's rate."""
     if batch.offsets_us is not None:
         return batch.t0_us + batch.offsets_us.astype(np.int64)
     return batch.t0_us + _steps_us(len(batch.samples), rate_hz)
@@ -33,7 +33,9 @@ def sample_times_us(batch: SampleBatch, rate_hz: float) -> Micros:
 
 @lru_cache(maxsize=64)
 def _steps_us(samples: int, rate_hz: float) -> Micros:
-    """Time (n,) since the first of some even samples; batches of a stream have few sizes."""
+    """Time (n,) since the first of some evenly spaced samples; cached, because batches of a stream have
+    few sizes.
+    """
     steps: Micros = np.rint(np.arange(samples) * (1e6 / rate_hz)).astype(np.int64)
     steps.setflags(write=False)
     return steps
@@ -49,7 +51,7 @@ class _Group:
 
 
 class LiveClock:
-    """Offsets from each stream's device clock to the common one; fed with the batches in order.
+    """Offsets from each stream's device clock to the common one; the batches are pushed in order.
 
     With a single clock there is nothing to align and the offset is 0.
     """
@@ -60,7 +62,7 @@ class LiveClock:
         self.single = len({id(g) for g in self._groups.values()}) == 1
 
     def push(self, stream: int, first_us: int, last_us: int, sent_us: int) -> None:
-        """Note when a batch was sampled, first and last sample, and when it was sent."""
+        """Register when the first and last sample of a batch were taken, and when it was sent."""
         group = self._groups[stream]
         if group.settled:
             return
@@ -74,15 +76,15 @@ class LiveClock:
         group.settled = age >= SETTLING_US
 
     def offset_us(self, stream: int, *, final: bool = True) -> int | None:
-        """What to add to a stream's device clock; None before its first second is over.
+        """Offset to add to a stream's device clock; None during its first second.
 
         Parameters
         ----------
-        final : False = what the batches so far say, for a stream that ended within its first second.
+        final : False = estimate from the batches so far, for a stream that ended within its first second.
         """
         return 0 if self.single else self.sender_offset_us(stream, final=final)
 
     def sender_offset_us(self, stream: int, *, final: bool = True) -> int | None:
-        """The same to the sender's clock, also where there is nothing to align."""
+        """The same relative to the sender's clock, also with a single clock."""
         group = self._groups[stream]
         return group.offset_us if group.settled or not final else None

@@ -1,7 +1,6 @@
-"""What a live tablet says first: which device clocks there are and which sensors tick on each.
+"""First message of a live tablet: its device clocks and the sensors on each.
 
-docs/reference/live-protocol.md, `hello`. The token is read with it and is never part of what is compared or
-stored.
+docs/reference/live-protocol.md, `hello`. The token is read with it and is never compared or stored.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ class SensorInfo:
 
     Parameters
     ----------
-    segment : None = not used. acc_range : m/s², gyr_range : rad/s, None = not said.
+    segment : None = not used. acc_range : m/s², gyr_range : rad/s, None = not given.
     """
 
     id: str
@@ -49,7 +48,8 @@ class StreamInfo:
     Parameters
     ----------
     stream : its number in the batches.
-    clock : "shared": all streams so marked tick together; "own": aligned by when its batches were sent.
+    clock : "shared": all streams with this value tick together; "own": aligned by the sending times of its
+        batches.
     """
 
     stream: int
@@ -60,7 +60,7 @@ class StreamInfo:
 
 @dataclass(frozen=True)
 class Hello:
-    """The streams of a take; equal whatever the token."""
+    """The streams of a recording; equality ignores the token."""
 
     take: str
     source: Source
@@ -68,7 +68,7 @@ class Hello:
     token: str = field(default="", compare=False, repr=False)
 
     def stream(self, number: int) -> StreamInfo:
-        """The stream of a number.
+        """The stream with a number.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Hello:
 
 
 def parse_hello(data: bytes | str) -> Hello:
-    """Read a hello from JSON; keys that are not known are passed over.
+    """Parse a hello from JSON; unknown keys are ignored.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def hello_of(root: object) -> Hello:
 
 
 def hello_json(hello: Hello, token: str | None = None) -> bytes:
-    """Canonical JSON; with a token it is what the tablet sends, without what the log stores."""
+    """Canonical JSON; with a token as sent by the tablet, without as stored in the log."""
     root: dict[str, object] = {
         "type": "hello",
         "protocol": PROTOCOL,

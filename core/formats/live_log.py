@@ -1,9 +1,9 @@
-"""Batches of the live protocol and the log of a take: `sagittal.live.v1` as bytes
+"""Batches of the live protocol and the log of a recording: `sagittal.live.v1` as bytes
 (docs/reference/live-protocol.md).
 
-A batch is what one device clock sampled in a row. The log is the file mark and records
-(u32 length, u32 crc32, body) with body[0] = H hello, B batch as received, F finish. It is written while the
-take runs and is itself the recording afterwards; everything live is a function of its records in order.
+A batch contains consecutive samples of one device clock. The log is the file mark and records (u32 length,
+u32 crc32, body) with body[0] = H hello, B batch as received, F finish. It is written during the recording and
+is itself the stored recording afterwards; everything live is a function of its records in order.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ Kind = Literal["H", "B", "F"]
 
 
 class Header(NamedTuple):
-    """What stands before the samples of a batch; times in µs of the device's and of the sender's clock."""
+    """Header of a batch; times in µs of the device's and of the sender's clock."""
 
     flags: int
     n_imu: int
@@ -103,14 +103,14 @@ class Header(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class SampleBatch:
-    """Samples of one stream in a row.
+    """Consecutive samples of one stream.
 
     Parameters
     ----------
-    seq : one sequence per take over all streams. t0_us : device clock of the first sample.
-    sent_us : the sender's monotonic clock when it was sent first.
+    seq : one sequence per recording over all streams. t0_us : device clock of the first sample. sent_us : the
+        sender's monotonic clock at the first transmission.
     samples : (n, k, 9) float32, acc m/s², gyr rad/s, mag, of the stream's k sensors; NaN = not measured.
-    offsets_us : (n,) uint32 from t0, None = evenly by the stream's rate.
+    offsets_us : (n,) uint32 from t0, None = evenly spaced by the stream's rate.
     """
 
     stream: int
@@ -123,14 +123,14 @@ class SampleBatch:
 
 @dataclass(frozen=True)
 class Finish:
-    """The sender's last word: number of batches, and sha256 over the payloads in order of seq."""
+    """Final message of the sender: number of batches, and SHA-256 over the payloads in order of seq."""
 
     count: int
     sha256: str
 
 
 class LogRecord(NamedTuple):
-    """One record of a log: its kind, what follows the kind's letter, and where it ends in the data."""
+    """One record of a log: its kind, the content after the kind's letter, and its end in the data."""
 
     kind: Kind
     body: bytes
@@ -138,7 +138,7 @@ class LogRecord(NamedTuple):
 
 
 def encode_batch(batch: SampleBatch) -> bytes:
-    """A batch as the frame that is sent.
+    """Encode a batch as a frame for transmission.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def encode_batch(batch: SampleBatch) -> bytes:
 
 
 def read_batch_header(frame: Buffer) -> Header:
-    """Check a frame's mark, shape and checksum and give its header; the samples are not looked at.
+    """Validate a frame's mark, shape and checksum and return its header; samples are not inspected.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def read_batch_header(frame: Buffer) -> Header:
 
 
 def _check(header: Header) -> int:
-    """Length of a frame with this header, or why there is none."""
+    """Length of a frame with this header, or the reason why it is invalid."""
     if header.flags & ~HAS_OFFSETS or not 1 <= header.n_samples <= MOST_SAMPLES or header.n_imu < 1:
         raise InputError(
             "batch_shape",
@@ -206,11 +206,11 @@ def _check(header: Header) -> int:
 
 
 def check_fits(header: Header, hello: Hello) -> StreamInfo:
-    """The stream that a batch belongs to.
+    """The stream of a batch.
 
     Raises
     ------
-    InputError `batch_stream` for an unknown one, `batch_shape` when the number of sensors differs.
+    InputError `batch_stream` for an unknown one, `batch_shape` if the number of sensors differs.
     """
     info = hello.stream(header.stream)
     if header.n_imu != len(info.sensors):
@@ -222,15 +222,15 @@ def check_fits(header: Header, hello: Hello) -> StreamInfo:
 
 
 def decode_batch(frame: Buffer, header: Header | None = None) -> SampleBatch:
-    """The batch in a frame; its arrays look into the frame's memory.
+    """Decode the batch in a frame; its arrays are views of the frame's memory.
 
     Parameters
     ----------
-    header : of `read_batch_header`, when the frame is checked already.
+    header : from `read_batch_header`, if the frame has already been validated.
 
     Raises
     ------
-    InputError of `read_batch_header`.
+    InputError as `read_batch_header`.
     """
     h = header or read_batch_header(frame)
     count = h.n_samples * h.n_imu * CHANNELS
@@ -240,14 +240,15 @@ def decode_batch(frame: Buffer, header: Header | None = None) -> SampleBatch:
 
 
 def view_samples(frame: Buffer, header: Header) -> memoryview:
-    """The bytes of the samples, which the finish hash is taken over."""
+    """The sample bytes, the input of the finish hash."""
     return memoryview(frame)[_HEAD.size : _HEAD.size + 4 * header.n_samples * header.n_imu * CHANNELS]
 
 
 def batch_of_json(root: Mapping[str, object]) -> SampleBatch:
-    """A batch that came as JSON: {"type": "batch", "stream", "seq", "t0_us", "sent_us", "samples"}.
+    """A batch sent as JSON: {"type": "batch", "stream", "seq", "t0_us", "sent_us", "samples"}.
 
-    `samples` is n lists of one list of 9 numbers per sensor, null = not measured; `offsets_us` may follow.
+    `samples` is a list of n lists, each with one list of 9 numbers per sensor, null = not measured;
+    `offsets_us` is optional.
 
     Raises
     ------
@@ -272,7 +273,7 @@ def batch_of_json(root: Mapping[str, object]) -> SampleBatch:
 
 
 def parse_finish(data: bytes | str) -> Finish:
-    """Read {"type": "finish", "count", "sha256"}.
+    """Parse {"type": "finish", "count", "sha256"}.
 
     Raises
     ------
@@ -297,14 +298,14 @@ def finish_of(root: object) -> Finish:
 
 
 def finish_json(finish: Finish) -> bytes:
-    """What the tablet sends and the log stores."""
+    """The JSON sent by the tablet and stored in the log."""
     return json.dumps(
         {"type": "finish", "count": finish.count, "sha256": finish.sha256}, separators=(",", ":")
     ).encode()
 
 
 def record(kind: Kind, body: Buffer) -> bytes:
-    """One record of the log."""
+    """Encode one record of the log."""
     whole = b"".join((kind.encode(), body))
     return _RECORD.pack(len(whole), crc32(whole)) + whole
 
@@ -318,15 +319,15 @@ def is_whole_length(head: bytes, size: int) -> bool:
 
 
 def scan(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
-    """The whole records of a log and how many bytes of the data they and what is before them take.
+    """The complete records of a log, and the number of bytes up to the end of the last one.
 
     Parameters
     ----------
-    start : 0 = the file mark, any other = where a record begins.
+    start : 0 = the file mark, any other = the beginning of a record.
 
     Returns
     -------
-    What follows the length is torn or damaged; 0 when not even the file mark is whole.
+    Data after that length are truncated or damaged; 0 if even the file mark is incomplete.
     """
     if start == 0:
         if bytes(data[: len(FILE_MARK)]) != FILE_MARK:

@@ -1,4 +1,4 @@
-"""The log of a live take → Recording: what was acknowledged is what is read, and what is odd is said."""
+"""The log of a live recording → Recording: all acknowledged data, with notices on irregularities."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ from sagittal.core.signals.recording import ImuStream, Recording
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell a live log by its mark."""
+    """Whether the data begin with the mark of a live log."""
     return data.startswith(FILE_MARK)
 
 
 @dataclass
 class _Taken:
-    """What the records say."""
+    """Content of the records."""
 
     hello: Hello
     batches: list[SampleBatch] = field(default_factory=list)
@@ -49,11 +49,11 @@ class _Taken:
 
 
 def read_live_log(data: bytes, source: str) -> Recording:
-    """Read a live take from its log.
+    """Read a live recording from its log.
 
     Parameters
     ----------
-    data : the file, possibly with a torn end. source : its name.
+    data : the file, possibly truncated. source : its name.
 
     Returns
     -------
@@ -62,8 +62,7 @@ def read_live_log(data: bytes, source: str) -> Recording:
 
     Raises
     ------
-    FormatError
-        bad_live_log (damaged before the first sample), empty (no sample).
+    FormatError bad_live_log (damaged before the first sample), empty (no sample).
     """
     records, length = scan(data)
     taken = _taken(records, source)
@@ -87,9 +86,9 @@ def read_live_log(data: bytes, source: str) -> Recording:
 
 
 def find_start_us(records: Iterable[LogRecord]) -> int | None:
-    """Return the sender's clock at the take's time 0, its first sample; None of a log without a batch.
+    """The sender's clock at time 0 of the recording, its first sample; None for a log without a batch.
 
-    Source: what of `LiveClock` bounds the way of a sample; that way itself, some 10 ms, stays in.
+    As bounded by `LiveClock`; the transmission delay itself, some 10 ms, remains.
     """
     clock: LiveClock | None = None
     rates: dict[int, float] = {}
@@ -111,7 +110,7 @@ def find_start_us(records: Iterable[LogRecord]) -> int | None:
 
 
 def _taken(records: Sequence[LogRecord], source: str) -> _Taken:
-    """Decode the records up to the first that does not follow."""
+    """Decode the records up to the first one out of sequence."""
     if not records or records[0].kind != "H":
         raise FormatError(
             "bad_live_log", f"{source} is damaged at its beginning; there is no hello to read it by."
@@ -159,7 +158,7 @@ def _compare_finish(taken: _Taken, source: str) -> None:
 
 
 def _streams(taken: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Notice]]:
-    """Streams by sensor, in the order of the hello, and what is to be said of them."""
+    """Streams by sensor, in the order of the hello, and notices about them."""
     clock = LiveClock(taken.hello)
     by_number: dict[int, list[SampleBatch]] = {}
     times: dict[int, list[Micros]] = {}
@@ -206,7 +205,7 @@ def _missing(sensors: Sequence[SensorInfo]) -> Notice:
 def _in_order(
     t_us: Micros, batches: Sequence[SampleBatch], info: StreamInfo
 ) -> tuple[Micros, Floats, list[Notice]]:
-    """Samples (n, k, 9) whose time is above all before; the others are left out and counted."""
+    """Samples (n, k, 9) with a time later than all previous ones; the others are dropped and counted."""
     samples: Floats = np.concatenate([b.samples for b in batches]).astype(np.float64)
     ahead = np.maximum.accumulate(t_us)
     rising = np.concatenate(([True], t_us[1:] > ahead[:-1]))
@@ -224,7 +223,7 @@ def _in_order(
 
 
 def _stream(info: StreamInfo, sensor: SensorInfo, t_s: Floats, x: Floats, source: str) -> ImuStream | None:
-    """One sensor, None without a sample; what was sent as infinite is missing and counted."""
+    """One sensor, None without a sample; infinite values are missing and counted."""
     infinite = int(np.count_nonzero(np.isinf(x).any(axis=1)))
     x[np.isinf(x)] = np.nan
     missing = int(np.count_nonzero(np.isnan(x[:, :6]).any(axis=1))) - infinite

@@ -1,7 +1,7 @@
-"""The manifest: what the files cannot say themselves (docs/reference/formats.md).
+"""The manifest: information that the files do not contain (docs/reference/formats.md).
 
-Parsed by hand instead of by a schema library: core knows only numpy and scipy, and a message must name the
-exact place ("sources[0].columns.foot_l.acc") and what would be right there.
+Parsed by hand instead of with a schema library: core depends only on numpy and scipy, and a message must name
+the exact place ("sources[0].columns.foot_l.acc") and the expected content.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ MAX_BYTES: Final = 1_000_000
 
 @dataclass(frozen=True)
 class Manifest:
-    """What somebody declared about a take.
+    """Declarations about a recording.
 
     Parameters
     ----------
     sensors : device id → segment, None = ignore this sensor.
-    protocol : None = not said (walk). belt_speed_mps : of a treadmill.
-    corrections : device id → what its file says wrongly.
-    test_limits : when a functional test began and ended, as a person says.
+    protocol : None = not given (walk). belt_speed_mps : of a treadmill.
+    corrections : device id → correction of errors in its file.
+    test_limits : manually given start and end of a functional test.
     """
 
     subject: Subject = field(default_factory=Subject)
@@ -51,10 +51,10 @@ class Manifest:
         return next((s for s in self.sources if s.covers(name)), None)
 
     def complete_from(self, other: Manifest) -> Manifest:
-        """This manifest, with what it leaves open taken from another.
+        """This manifest, with undeclared items taken from another.
 
-        `sensors` are taken as a whole, since one of them says who wears what; everything else by its parts.
-        A belt's speed goes with its protocol.
+        `sensors` are taken as a whole, since either of them defines the complete assignment; everything else
+        item by item. A belt speed belongs to its protocol.
         """
         protocol = self.protocol or other.protocol
         belt = other.belt_speed_mps if other.protocol == protocol else None
@@ -76,18 +76,17 @@ KEYS: Final = frozenset(
 
 
 def is_manifest(value: object) -> bool:
-    """Tell whether a JSON value means to be a manifest."""
+    """Whether a JSON value is intended to be a manifest."""
     return isinstance(value, dict) and bool(value.keys() & KEYS)
 
 
 def parse_manifest(data: bytes) -> Manifest:
-    """Read a manifest from JSON text.
+    """Parse a manifest from JSON text.
 
     Raises
     ------
-    ManifestError
-        manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment, duplicate_segment,
-        unknown_protocol, height_implausible, standing_width_implausible, unknown_angle,
+    ManifestError manifest_bad_json, manifest_unknown_key, manifest_bad_value, unknown_segment,
+        duplicate_segment, unknown_protocol, height_implausible, standing_width_implausible, unknown_angle,
         standing_angle_implausible, shoe_implausible, unknown_unit, belt_speed_implausible,
         belt_speed_without_treadmill, correction_implausible; the message names the path inside the manifest.
     """

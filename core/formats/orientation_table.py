@@ -1,6 +1,6 @@
 """Orientations over time from another system: OpenSim .sto, or a table with four columns for each segment.
 
-A reference to compare with, never a recording: it holds no measurement of ours (docs/reference/formats.md,
+A reference for comparison, never a recording: it contains no sensor measurements (docs/reference/formats.md,
 "Reference orientations").
 """
 
@@ -37,11 +37,11 @@ HOW: Final = "Expected a column 'time' in s, and for each segment four columns l
 
 @dataclass(frozen=True, eq=False)
 class OrientationTable:
-    """Orientations as a file gives them, in its own axes.
+    """Orientations as given in a file, in its own axes.
 
     Parameters
     ----------
-    t_s : (n,) s on its own clock, increasing. q : name → (n, 4) unit, scalar first, NaN where none is given.
+    t_s : (n,) s on its own clock, increasing. q : name → (n, 4) unit, scalar first, NaN if missing.
     """
 
     source: str
@@ -55,8 +55,7 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
 
     Parameters
     ----------
-    data : bytes of an .sto file of quaternions, or of a table with one header row; which one, its content
-        decides.
+    data : bytes of an .sto file of quaternions, or of a table with one header row; detected from the content.
 
     Raises
     ------
@@ -98,7 +97,7 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
 
 
 def _open_sto(data: bytes, head: list[bytes], source: str) -> tuple[list[str], memoryview, bytes]:
-    """Column names and rows of an .sto file, each cell "w,x,y,z" taken apart."""
+    """Column names and rows of an .sto file, each cell "w,x,y,z" split."""
     end = next(i for i, line in enumerate(head) if line.strip().lower() == _STO_MARK)
     if not any(line.replace(b" ", b"").lower() == b"datatype=quaternion" for line in head[:end]):
         raise FormatError(
@@ -114,7 +113,7 @@ def _open_sto(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
 
 
 def _open_csv(data: bytes, head: list[bytes], source: str) -> tuple[list[str], memoryview, bytes]:
-    """Column names and rows of a table; lines that begin with # or // are left out before its header."""
+    """Column names and rows of a table; lines starting with # or // before its header are skipped."""
     first = next((i for i, line in enumerate(head) if line.strip() and not line.startswith((b"#", b"//"))), 0)
     separator = text.guess_separator([line for line in head[first : first + 3] if line.strip()])
     if separator is None:
@@ -124,7 +123,7 @@ def _open_csv(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
 
 
 def _group(names: list[str], source: str) -> dict[str, tuple[str, ...]]:
-    """Name → its four columns, scalar first; what is not complete is left out."""
+    """Name → its four columns, scalar first; incomplete ones are omitted."""
     parts: dict[str, dict[str, str]] = {}
     for column in names:
         if (found := _PART.fullmatch(column)) is not None:
@@ -145,7 +144,7 @@ def _group(names: list[str], source: str) -> dict[str, tuple[str, ...]]:
 
 
 def _unit(q: Floats, name: str, source: str) -> Floats:
-    """The same with rows that are no unit quaternions as NaN."""
+    """The quaternions with rows that are not unit quaternions set to NaN."""
     norm = np.linalg.norm(q, axis=1)
     good = (norm > _NORM[0]) & (norm < _NORM[1])
     if np.count_nonzero(good) < _LEAST * len(q):

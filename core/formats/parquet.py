@@ -1,9 +1,10 @@
-"""Sagittal's own recording file: Parquet with one column per channel
-(docs/reference/formats.md, "Sagittal recording (Parquet)").
+"""Sagittal's own recording file: Parquet with one column per channel (docs/reference/formats.md, "Sagittal
+recording (Parquet)").
 
-int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; what is not
-a signal (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema metadata.
-Rows are the union of the times of all streams; a row that a stream does not have is null, a missing one NaN.
+int64 time in µs, float32 signals, zstd with byte-stream split, page checksums and no dictionary; everything
+except the signals (units, sensor → segment, subject, protocol, hashes of the originals) is JSON in the schema
+metadata. Rows are the union of the times of all streams; a row that a stream does not have is null, a missing
+one NaN.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def _metadata(r: Recording) -> dict[str, object]:
         "belt_speed_mps": r.belt_speed_mps,
         "mounting": dict(r.mounting),
         "sha256": dict(r.sha256),
-        "notices": [_notice(n) for n in r.notices],
+        "notices": [n.to_json() for n in r.notices],
         "sensors": [
             {
                 "id": s.device_id,
@@ -117,33 +118,24 @@ def _metadata(r: Recording) -> dict[str, object]:
                 "source": s.source,
                 "rate_hz": s.rate_hz,
                 "clock": s.clock,
-                "notices": [_notice(n) for n in s.notices],
+                "notices": [n.to_json() for n in s.notices],
             }
             for s in r.streams.values()
         ],
     }
 
 
-def _notice(n: Notice) -> dict[str, object]:
-    return {"code": n.code, "message": n.message, "sensor": n.sensor, "t_s": n.t_s, "severity": n.severity}
-
-
-def _read_notice(n: Mapping[str, Any]) -> Notice:
-    return Notice(n["code"], n["message"], n["sensor"], n["t_s"], n["severity"])
-
-
 def looks_like(data: bytes) -> bool:
-    """Tell Parquet by its magic at both ends."""
+    """Whether the data have Parquet's magic at both ends."""
     return data[:4] == MAGIC
 
 
 def read_recording(data: bytes, source: str) -> Recording:
-    """Read what `write_recording` wrote.
+    """Read a file written by `write_recording`.
 
     Raises
     ------
-    FormatError
-        bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
+    FormatError bad_parquet (damaged or too large), foreign_parquet (not written by Sagittal), newer_schema.
     """
     try:
         file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True, pre_buffer=False)
@@ -160,7 +152,7 @@ def read_recording(data: bytes, source: str) -> Recording:
 
 
 def count_rows_and_sensors(file: SourceFile) -> tuple[int, int]:
-    """Rows and sensors of a Parquet file; 0 where it is damaged."""
+    """Number of rows and sensors of a Parquet file; 0 if damaged."""
     try:
         with file.open() as opened:
             opened_file = pq.ParquetFile(opened)
@@ -171,7 +163,7 @@ def count_rows_and_sensors(file: SourceFile) -> tuple[int, int]:
 
 
 def open_long(file: SourceFile) -> Recording:
-    """A stored recording that is too long to hold: its sensors are read block by block.
+    """Open a stored recording too long for memory: its sensors are read block by block.
 
     Raises
     ------
@@ -197,7 +189,7 @@ def open_long(file: SourceFile) -> Recording:
                 has_gyro=has_gyro,
                 duration_s=(last - first) * 1e-6,
                 open_blocks=partial(_read_blocks, file, device, has_gyro, first),
-                notices=tuple(_read_notice(n) for n in _list(sensor["notices"])),
+                notices=tuple(Notice.from_json(n) for n in _list(sensor["notices"])),
             )
         return Recording(
             streams={},
@@ -206,7 +198,7 @@ def open_long(file: SourceFile) -> Recording:
             protocol=cast("Protocol", info["protocol"]),
             mounting=_texts(info["mounting"]),
             sha256=_texts(info["sha256"]),
-            notices=tuple(_read_notice(n) for n in _list(info["notices"])),
+            notices=tuple(Notice.from_json(n) for n in _list(info["notices"])),
             long=long,
         )
     except DAMAGE as e:
@@ -214,7 +206,7 @@ def open_long(file: SourceFile) -> Recording:
 
 
 def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
-    """First and last time of a group of rows, µs."""
+    """First and last time of a row group, µs."""
     ends: list[int] = []
     for batch in reader.iter_batches(LONG_BLOCK, row_groups=[group], columns=[_TIME], use_threads=False):
         if batch.num_rows:
@@ -223,7 +215,7 @@ def _find_ends(reader: pq.ParquetFile, group: int) -> tuple[int, int]:
 
 
 def _read_blocks(file: SourceFile, device: str, has_gyro: bool, first_us: int) -> Iterator[SampleBlock]:
-    """Rows of one sensor from the first one."""
+    """Iterate over the rows of one sensor from the first one."""
     kinds = ("acc", "gyr") if has_gyro else ("acc",)
     names = [f"{device}.{name}" for kind in kinds for name in _AXES[kind]]
     with file.open() as opened:
@@ -278,7 +270,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
         device = str(sensor["id"])
         signals, rows = _read_signals(file, device, there, rooms)
         acc = signals["acc"]
-        known = [_read_notice(n) for n in _list(sensor["notices"])]
+        known = [Notice.from_json(n) for n in _list(sensor["notices"])]
         known += _clear_infinite(device, signals)
         if not has_whole_row(acc):
             message = f"{device} in {source} holds no acceleration; results that need it are left out."
@@ -312,7 +304,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
         protocol=cast("Protocol", info["protocol"]),
         mounting=_texts(info["mounting"]),
         sha256=_texts(info["sha256"]),
-        notices=(*(_read_notice(n) for n in _list(info["notices"])), *notices),
+        notices=(*(Notice.from_json(n) for n in _list(info["notices"])), *notices),
         belt_speed_mps=None if (belt := info.get("belt_speed_mps")) is None else float(str(belt)),
     )
 
@@ -323,9 +315,9 @@ def _read_signals(
     there: frozenset[str],
     rooms: Mapping[str, Iterator[NDArray[np.float32]]],
 ) -> tuple[dict[str, Any], NDArray[np.int64] | slice]:
-    """Signals (n, axes) of a sensor as float32, None where the file has none, and which rows it has.
+    """Signals (n, axes) of a sensor as float32, None if not in the file, and the rows it has.
 
-    One signal after the other: beside all of them a whole table would be as much once more.
+    One signal at a time: reading the whole table would double the memory.
     """
     signals: dict[str, Any] = dict.fromkeys(_AXES)
     rows: NDArray[np.int64] | slice = slice(None)
@@ -350,10 +342,10 @@ def _read_signals(
 
 
 def _make_rooms(sensors: int, rows: int, axes: int) -> Iterator[NDArray[np.float32]]:
-    """Arrays (rows, axes) to be written, one per sensor, several in one piece of memory where they are small.
+    """Arrays (rows, axes) to be filled, one per sensor, small ones allocated together.
 
-    Memory that was never touched costs more than what is done with it, and a large piece of it, for which
-    NumPy asks for large pages, a fifth of many small ones.
+    First access to fresh memory costs more than the processing, and in one large allocation, for which NumPy
+    requests huge pages, a fifth of many small ones.
     """
     together = max(1, -(-LARGE // max(1, rows * axes * 4)))
     while sensors > 0:
@@ -363,7 +355,7 @@ def _make_rooms(sensors: int, rows: int, axes: int) -> Iterator[NDArray[np.float
 
 
 def _clear_infinite(device: str, signals: Mapping[str, Floats | None]) -> list[Notice]:
-    """Make infinite values missing ones, in place; a notice where there were any."""
+    """Replace infinite values by missing ones, in place; returns a notice if there were any."""
     count = 0
     for kind in ("acc", "gyr", "mag"):
         signal = signals[kind]

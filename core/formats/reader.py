@@ -1,4 +1,4 @@
-"""The one door: files of an upload → Recording."""
+"""The single entry point: uploaded files → Recording."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MOST_ROWS_ALONE: Final = 2_000_000
 
 @dataclass
 class _Upload:
-    """What has been found so far."""
+    """Content read so far."""
 
     drafts: list[Draft] = field(default_factory=list)
     long: dict[str, LongStream] = field(default_factory=dict)
@@ -58,23 +58,20 @@ class _Upload:
 def read_recording(
     files: Sequence[SourceFile], manifest: Manifest | None = None, limits: ArchiveLimits | None = None
 ) -> Recording:
-    """Read one take from its files, whatever their format.
+    """Read one recording from its files in any supported format.
 
     Parameters
     ----------
     files : sensor files, archives of them, optionally a manifest or an OpenSense mapping among them.
-    manifest : wins over a manifest among the files, which completes what it leaves open.
+    manifest : takes precedence over a manifest among the files, which is used for undeclared items.
     limits : of archives.
 
     Raises
     ------
-    ArchiveError
-        An archive breaks a limit or is damaged (codes in `sagittal.core.formats.archive`).
-    FormatError
-        unknown_format when nothing could be read (with what was tried), or the problem of the only file;
-        duplicate_device, counter_restart.
-    ManifestError
-        The manifest is wrong or does not fit a file.
+    ArchiveError An archive violates a limit or is damaged (codes in `sagittal.core.formats.archive`).
+    FormatError unknown_format if nothing could be read (with the formats tried), or the error of the only
+        file; duplicate_device, counter_restart.
+    ManifestError The manifest is invalid or does not match a file.
     """
     members = expand(files, limits)
     if not members:
@@ -95,7 +92,7 @@ def read_recording(
 
 
 def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload: _Upload) -> Manifest | None:
-    """The manifest has to be known before tables can be read."""
+    """Find the manifest, which is required before tables can be read."""
     for member in members:
         if member.name.rsplit("/", 1)[-1] == EPISODE_MANIFEST:
             told = parse_manifest(member.read())
@@ -119,7 +116,7 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
 def _describe(
     member: SourceFile, members: Sequence[SourceFile], manifest: Manifest | None, upload: _Upload
 ) -> SourceSpec | None:
-    """How a file is to be read: as the manifest says, else as the files beside it do."""
+    """Specification of a file: from the manifest, else from its sidecar files."""
     spec = manifest.source_of(member.name) if manifest else None
     if (spec and spec.columns) or not bids.is_table(member.name):
         return spec
@@ -142,7 +139,7 @@ def _describe(
 
 
 def _measure(member: SourceFile, spec: SourceSpec | None) -> tuple[float, int]:
-    """Rows and sensors of a file that could be read block by block; 0 of others and of damaged ones."""
+    """Rows and sensors of a file that can be read block by block; 0 for other and damaged ones."""
     with member.open() as opened:
         head = opened.read(1 << 16)
     if cwa.looks_like(head):
@@ -157,7 +154,7 @@ def _measure(member: SourceFile, spec: SourceSpec | None) -> tuple[float, int]:
 
 
 def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long: bool) -> None:
-    """Read one file; a file that cannot be read is remembered, it does not stop the others."""
+    """Read one file; errors are collected without stopping the others."""
     if _take_long(member, spec, upload, long=long):
         return
     raw = member.read()
@@ -196,9 +193,10 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
 
 
 def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long: bool) -> bool:
-    """Open a file that is too long to hold, to be read block by block; True when that is all to be done.
+    """Open a file too long for memory for reading block by block; True if nothing else has to be read.
 
-    A CWA file is always opened so; a short one is read as well, so that every protocol can use it.
+    A CWA file is always opened this way; a short one is also read completely, so that every protocol can use
+    it.
     """
     with member.open() as opened:
         head = opened.read(len(cwa.MAGIC))
@@ -231,9 +229,10 @@ def _take_long(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, 
 
 
 def is_too_long(rows: float, sensors: int) -> bool:
-    """Whether a file of so many rows is too long to be analysed at once with all sensors of its take.
+    """Whether a file of this many rows is too long to be analysed in memory with all sensors of its
+    recording.
 
-    Known before any of it is read.
+    Determined before reading.
     """
     if sensors == 1:
         return rows > MOST_ROWS_ALONE
@@ -265,7 +264,7 @@ def _nothing_readable(upload: _Upload) -> FormatError:
 
 
 def _tell_alike(errors: Sequence[InputError]) -> str:
-    """What is wrong with one of some files that have the same fault, and how many others have it."""
+    """Error message for one of several files with the same fault, with the number of the others."""
     others = len(errors) - 1
     if not others:
         return errors[0].message
@@ -273,7 +272,7 @@ def _tell_alike(errors: Sequence[InputError]) -> str:
 
 
 def _stored(upload: _Upload) -> Recording:
-    """A stored recording is a whole take: it cannot be mixed with other files."""
+    """A stored recording is complete: it cannot be combined with other files."""
     if len(upload.stored) > 1 or upload.drafts:
         raise FormatError(
             "several_recordings",
@@ -284,7 +283,7 @@ def _stored(upload: _Upload) -> Recording:
 
 
 def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) -> Recording:
-    """Add what the manifest, the mapping file or the column names say."""
+    """Add the declarations of the manifest, the mapping file or the column names."""
     notices = [*recording.notices, *upload.notices]
     notices += [
         Notice(
@@ -330,7 +329,7 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
 
 
 def _worn(drafts: Sequence[Draft]) -> dict[str, Segment | None]:
-    """Where the files say that their sensors are; a place of two sensors is nobody's."""
+    """Sensor placements given in the files; a segment claimed by two sensors is assigned to neither."""
     said = {d.device_id: d.segment for d in drafts if d.segment is not None}
     count = Counter(said.values())
     return {device: segment for device, segment in said.items() if count[segment] == 1}
@@ -339,7 +338,7 @@ def _worn(drafts: Sequence[Draft]) -> dict[str, Segment | None]:
 def correct_streams(
     streams: Mapping[str, ImuStream], corrections: Mapping[str, SensorCorrection]
 ) -> tuple[dict[str, ImuStream], list[Notice]]:
-    """Streams with the axes and units that somebody declared to be the right ones, and a note for each."""
+    """Streams with declared corrections of axes and units, and a notice for each."""
     wanted = {device.lower(): x for device, x in corrections.items()}
     out, notices = dict(streams), []
     for device, stream in streams.items():
@@ -364,7 +363,7 @@ def correct_streams(
 def _assign(
     declared: Mapping[str, Segment | None], recording: Recording, by: str
 ) -> tuple[dict[str, Segment | None], list[Notice]]:
-    """Match declared ids to streams without regard to case; a declared sensor without a file is said."""
+    """Match declared ids to streams, ignoring case; a notice for each declared sensor without a file."""
     ids = {d.lower(): d for d in (*recording.long, *recording.streams)}
     segments: dict[str, Segment | None] = {}
     missing: list[Notice] = []

@@ -1,4 +1,4 @@
-"""A named piece of input whose bytes are read only when somebody needs them."""
+"""Named input whose bytes are read on demand."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class SourceFile:
 
     Parameters
     ----------
-    name : path as the sender gave it, with forward slashes; any Unicode.
+    name : path as given by the sender, with forward slashes; any Unicode.
     size : bytes (for an archive member the size its directory declares).
     read : returns all bytes; may raise `sagittal.core.errors.ArchiveError`.
-    opener : opens the bytes to be read piece by piece; None = they can only be had at once.
+    opener : opens a stream of the bytes; None = only available as a whole.
     """
 
     name: str
@@ -32,7 +32,7 @@ class SourceFile:
     opener: Callable[[], BinaryIO] | None = None
 
     def open(self) -> BinaryIO:
-        """The bytes from the start, to be closed by who asked."""
+        """A stream from the start, to be closed by the caller."""
         return io.BytesIO(self.read()) if self.opener is None else self.opener()
 
     @classmethod
@@ -42,12 +42,12 @@ class SourceFile:
 
     @classmethod
     def of_path(cls, path: Path, name: str | None = None) -> SourceFile:
-        """Wrap a file on disk; `name` defaults to its last part."""
+        """Wrap a file on disk; `name` defaults to the last part of its path."""
         return cls(name or path.name, path.stat().st_size, path.read_bytes, lambda: path.open("rb"))
 
 
 def list_source_files(paths: Iterable[Path]) -> Iterator[SourceFile]:
-    """Files that a person named, folders walked, as lazily read sources.
+    """The given files, with folders expanded recursively, as lazily read sources.
 
     Raises
     ------
@@ -61,7 +61,7 @@ def list_source_files(paths: Iterable[Path]) -> Iterator[SourceFile]:
 
 
 def read_named_file(path: Path) -> bytes:
-    """Bytes of a file that a person named; raises InputError `file_not_found`."""
+    """Bytes of a user-specified file; raises InputError `file_not_found`."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -69,12 +69,12 @@ def read_named_file(path: Path) -> bytes:
 
 
 def stem_of(name: str) -> str:
-    """Last part of a file's name without its ending."""
+    """Last part of a file's path without its extension."""
     return name.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
 
 
 def digest_file(file: SourceFile) -> str:
-    """Hexadecimal sha256 of a file, read piece by piece."""
+    """Hexadecimal SHA-256 of a file, read in chunks."""
     digest = hashlib.sha256()
     with file.open() as opened:
         while piece := opened.read(_PIECE):
@@ -83,5 +83,5 @@ def digest_file(file: SourceFile) -> str:
 
 
 def sha256(data: bytes) -> str:
-    """Hexadecimal sha256 of bytes."""
+    """Hexadecimal SHA-256 of bytes."""
     return hashlib.sha256(data).hexdigest()

@@ -1,4 +1,4 @@
-"""An entry of the manifest's `sources`: how a file is cut into columns and what they are."""
+"""An entry of the manifest's `sources`: how to split a file into columns, and their meaning."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ class Channels:
 
 @dataclass(frozen=True)
 class Counter:
-    """A column of a table that counts samples, so that lost rows are lost time.
+    """A table column that counts samples, so that lost rows are recognised as lost time.
 
     Parameters
     ----------
-    column : its name; it goes up by 1 per sample. wrap : it starts again from 0 at this count, None = 16 bit
-        (32 bit when it shows more).
+    column : its name; increases by 1 per sample. wrap : it restarts from 0 at this count, None = 16 bit (32
+        bit if it has larger values).
     """
 
     column: str
@@ -61,16 +61,16 @@ class Counter:
 
 @dataclass(frozen=True)
 class SourceSpec:
-    """How one file (or all files that match a pattern) is to be read; None = the file says so itself.
+    """How to read one file (or all files that match a pattern); None = determined by the file itself.
 
     Parameters
     ----------
     file : name or pattern with * and ?, compared with the whole path and with its last part.
     skip_rows : lines before the header. header_rows : lines of the header.
-    index_column : the first column is no signal.
-    rate_hz : nominal sampling rate. time_column, time_unit : where the time is; counter : what counts the
-        samples; without either the rate makes time.
-    gravity_included : False when the device has already removed gravity (not usable, said so).
+    index_column : the first column is an index, not a signal.
+    rate_hz : nominal sampling rate. time_column, time_unit : the time column; counter : the sample counter;
+        without either, time follows from the rate.
+    gravity_included : False if the device has already removed gravity (unusable, with a message).
     columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
     quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
     """
@@ -93,7 +93,7 @@ class SourceSpec:
     frame: str | None = None
 
     def covers(self, name: str) -> bool:
-        """Tell whether this entry speaks of the file `name`."""
+        """Whether this entry applies to the file `name`."""
         last = name.replace("\\", "/").rsplit("/", 1)[-1]
         return self.file in (name, last) or fnmatchcase(name, self.file) or fnmatchcase(last, self.file)
 
@@ -105,12 +105,11 @@ _SOURCE_KEYS: Final = (
 
 
 def read_source(node: JsonNode) -> SourceSpec:
-    """One entry of the manifest's `sources`.
+    """Parse one entry of the manifest's `sources`.
 
     Raises
     ------
-    ManifestError
-        manifest_unknown_key, manifest_bad_value, unknown_unit, unsupported_frame; with the place.
+    ManifestError manifest_unknown_key, manifest_bad_value, unknown_unit, unsupported_frame; with the path.
     """
     node.only(*_SOURCE_KEYS)
     if node.text("file") is None:
@@ -142,7 +141,7 @@ def read_source(node: JsonNode) -> SourceSpec:
 
 
 def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
-    """What counts the samples of a table, if anything does, and samples per second."""
+    """Sample counter of a table, if any, and samples per second."""
     rate = _rate(node)
     inner = node.child("counter")
     if not inner.keys:

@@ -51,7 +51,7 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
 
 
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
-    """Drop the rows at the end in which no sensor has a value, as where an EMG was recorded for longer."""
+    """Drop trailing rows without any sensor value, as in exports with a longer EMG recording."""
     names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
     known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
     end = known[-1] + 1 if len(known) else None
@@ -60,7 +60,7 @@ def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
 
 @dataclass(frozen=True)
 class _Layout:
-    """How the rows of one table are cut. titles : of all columns. wanted : columns that are read."""
+    """Layout of one table. titles : of all columns. wanted : columns to read."""
 
     separator: bytes
     titles: list[str]
@@ -68,14 +68,14 @@ class _Layout:
     comma: bool
 
     def read(self, body: memoryview, source: str) -> text.Columns:
-        """Rows without a header as columns."""
+        """Parse rows without header into columns."""
         return text.read_columns(
             body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma
         )
 
 
 def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
-    """What the head of a table says; errors as in `read_table`."""
+    """Layout from the head of a table; errors as in `read_table`."""
     _check(spec, source)
     lines = text.head_lines(data, spec.skip_rows + spec.header_rows + _ROWS_TO_LOOK_AT)
     header = lines[spec.skip_rows : spec.skip_rows + spec.header_rows]
@@ -95,16 +95,17 @@ def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
 
 
 def estimate_rows(head: bytes, size: int) -> float:
-    """How many lines a text of so many bytes has, by its beginning; 0 for what is no text."""
+    """Estimated number of lines of a text of this size, from its beginning; 0 for other content."""
     return size * head.count(b"\n") / max(1, len(head)) if text.is_text(head) else 0.0
 
 
 def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]:
-    """The sensors of a table that is too long to hold: rows are read a few megabytes at a time.
+    """The sensors of a table too long for memory: rows are read in chunks of a few megabytes.
 
     Raises
     ------
-    ManifestError, FormatError as `read_table`; and `counter_too_long`: a long table needs a time or a rate.
+    ManifestError, FormatError as `read_table`; and `counter_too_long`: a long table requires a time column or
+    a rate.
     """
     source = file.name
     if spec.counter is not None:
@@ -140,7 +141,7 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
 
 
 def _ends(file: SourceFile) -> tuple[bytes, memoryview]:
-    """Beginning of a table, and whole lines of its end."""
+    """Beginning of a table, and complete lines of its end."""
     with file.open() as opened:
         head = opened.read(_CHUNK)
         opened.seek(max(0, file.size - _CHUNK // 8))
@@ -149,7 +150,7 @@ def _ends(file: SourceFile) -> tuple[bytes, memoryview]:
 
 
 def _whole_lines(data: memoryview) -> memoryview:
-    """Up to the last end of a line; all of it without one."""
+    """Data up to the last line end; all of it without one."""
     end = bytes(data).rfind(b"\n") + 1
     return data[:end] if end else data
 
@@ -157,7 +158,7 @@ def _whole_lines(data: memoryview) -> memoryview:
 def _read_blocks(
     file: SourceFile, spec: SourceSpec, layout: _Layout, channels: Channels, start: float, rate: float
 ) -> Iterator[SampleBlock]:
-    """Rows from the first one, a few megabytes at a time."""
+    """Iterate over the rows from the first one, in chunks of a few megabytes."""
     acc_unit, gyr_unit = ACC_UNITS[spec.acc_unit or "m/s2"], GYR_UNITS[spec.gyr_unit or "rad/s"]
     rows = 0
     with file.open() as opened:
@@ -186,7 +187,7 @@ def _read_blocks(
 
 
 def squeeze_blanks(data: bytes) -> bytes:
-    """Columns that were lined up with several spaces are one space apart, and none is before the first."""
+    """Collapse runs of spaces that align columns, and remove leading ones."""
     return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 
 
@@ -215,7 +216,7 @@ def _check(spec: SourceSpec, source: str) -> None:
 
 
 def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
-    """Column titles; several header rows are joined by "/", a table without a header counts 1, 2, 3 …"""
+    """Column titles; several header rows are joined by "/", a table without a header is numbered 1, 2, 3 …"""
     cells = row.count(separator) + 1
     parts = [text.split(line, separator) for line in header]
     parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
@@ -263,7 +264,7 @@ def _counted(spec: SourceSpec) -> str | None:
 
 
 def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str]:
-    """Ticks of every row and what they are (see `Draft`)."""
+    """Ticks of every row and their kind (see `Draft`)."""
     if spec.counter is not None:
         counts = table.values[spec.counter.column]
         _check_counter(counts, spec.counter, source)
@@ -275,7 +276,7 @@ def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, s
 
 
 def _check_counter(counts: Floats, counter: Counter, source: str) -> None:
-    """Refuse a column that does not count samples: time would run at another speed."""
+    """Reject a column that does not count samples, which would distort time."""
     steps = np.diff(counts[np.isfinite(counts)])
     step = float(np.median(steps)) if len(steps) else 1.0
     if step != 1.0:

@@ -1,4 +1,4 @@
-"""What an unknown table probably holds: shape, clock, signals, units, as an entry of `sources` to confirm.
+"""Probable content of an unknown table: layout, clock, signals, units, as an entry of `sources` to confirm.
 
 Only its beginning is read, whatever its length.
 """
@@ -92,13 +92,12 @@ the second in deg/s."""
 
 @dataclass(frozen=True)
 class TableLook:
-    """The head of a table and what it probably is.
+    """The head of a table and its probable content.
 
     Parameters
     ----------
-    names : columns as a manifest calls them. rows : the first ones, as text.
-    source : entry of `sources` without `file`; what could not be told is left out. A sensor that no column
-        names is called THE_FILE.
+    names : columns as named in a manifest. rows : the first ones, as text. source : entry of `sources`
+        without `file`; undetermined items are omitted. A sensor not named by any column is called THE_FILE.
     """
 
     names: tuple[str, ...]
@@ -107,9 +106,9 @@ class TableLook:
 
 
 def look_into_table(file: SourceFile) -> TableLook | None:
-    """Guess what a table holds; None for what is none, or holds no acceleration that can be told.
+    """Guess the content of a table; None if it is not a table, or has no identifiable acceleration.
 
-    A table without three columns of one acceleration is a TableLook whose `columns` are empty.
+    For a table without three columns of one acceleration `columns` is empty.
     """
     with file.open() as opened:
         raw = opened.read(PIECE)
@@ -143,7 +142,7 @@ def look_into_table(file: SourceFile) -> TableLook | None:
 
 
 def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """The entry of `sources` for one file of that shape; raises ManifestError without columns."""
+    """The entry of `sources` for one file with that layout; raises ManifestError without columns."""
     said = source.get("columns")
     if not isinstance(said, Mapping) or not said:
         raise ManifestError(
@@ -157,7 +156,7 @@ def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def read_sample(file: SourceFile, spec: SourceSpec) -> list[Draft]:
-    """The sensors of the beginning of a table; raises as `table.read_table`."""
+    """Read the sensors at the beginning of a table; raises as `table.read_table`."""
     with file.open() as opened:
         data = text.to_utf8(opened.read(PIECE))
     end = data.rfind(b"\n") + 1
@@ -165,7 +164,9 @@ def read_sample(file: SourceFile, spec: SourceSpec) -> list[Draft]:
 
 
 def _find_shape(data: bytes) -> tuple[bytes, int, int, int, bool] | None:
-    """Separator, lines before and of the header, first line of numbers, if the first column is nameless."""
+    """Separator, lines before and in the header, first line of numbers, whether the first column is
+    unnamed.
+    """
     lines = text.head_lines(data, _LINES)
     best: tuple[int, bytes, int] | None = None
     for separator in text.SEPARATORS:
@@ -202,7 +203,7 @@ def _find_shape(data: bytes) -> tuple[bytes, int, int, int, bool] | None:
 
 
 def _is_numbers(cells: Sequence[str]) -> bool:
-    """Mostly numbers, the rest blank or one text such as a date."""
+    """Whether cells are mostly numbers, the rest blank or one text such as a date."""
     numbers = sum(_number(c) is not None for c in cells)
     return numbers >= _LEAST_CELLS and numbers + sum(c in text.MISSING for c in cells) >= len(cells) - 1
 
@@ -217,7 +218,7 @@ def _number(cell: str) -> float | None:
 def _values(
     data: bytes, rows_from: int, separator: bytes, names: Sequence[str], comma: bool
 ) -> dict[str, Floats]:
-    """Columns of the whole lines of a beginning, NaN where a cell is no number."""
+    """Columns of the complete lines of a beginning, NaN for non-numeric cells."""
     body = text.after_lines(data, rows_from)
     end = bytes(body).rfind(b"\n") + 1
     rows = bytes(body[:end] if end else body)
@@ -230,7 +231,7 @@ def _values(
 
 
 def _clock(names: Sequence[str], values: Mapping[str, Floats], before: str) -> dict[str, Any]:
-    """What makes the time: a clock, else a counter, else a rate alone; and the rate, where it can be told."""
+    """Time source: a clock, else a counter, else a rate alone; and the rate if it can be determined."""
     for name in names:
         said = _TIME.fullmatch(name)
         steps = np.diff(values.get(name, np.zeros(0)))
@@ -252,7 +253,9 @@ def _clock(names: Sequence[str], values: Mapping[str, Floats], before: str) -> d
 
 
 def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, Floats]) -> dict[str, Any]:
-    """Columns of every sensor with an acceleration, and their units; equal titles are of several sensors."""
+    """Columns of every sensor with an acceleration, and their units; repeated titles belong to several
+    sensors.
+    """
     groups: dict[str, dict[str, dict[str, str]]] = {}
     units: dict[str, set[str]] = {"acc": set(), "gyr": set()}
     seen: Counter[str] = Counter()
@@ -290,7 +293,7 @@ def _signals(names: Sequence[str], titles: Sequence[str], values: Mapping[str, F
 
 
 def _read_name(name: str) -> tuple[str, str, str, str] | None:
-    """Sensor, kind, axis and unit that the name of a column speaks of."""
+    """Sensor, quantity, axis and unit given in the name of a column."""
     unit = ""
     plain = name.strip()
     if said := _UNIT.search(plain):
@@ -315,7 +318,7 @@ def _only(found: set[str], known: Mapping[str, float]) -> str | None:
 def _norms(
     columns: Mapping[str, Mapping[str, Sequence[str]]], kind: str, values: Mapping[str, Floats]
 ) -> Floats:
-    """Lengths of one kind of signal, of all sensors."""
+    """Norms of one quantity over all sensors."""
     found = [
         np.linalg.norm(np.stack([values[c] for c in group[kind]], axis=1), axis=1)
         for group in columns.values()
@@ -335,7 +338,7 @@ def _acc_unit(columns: Mapping[str, Mapping[str, Sequence[str]]], values: Mappin
 def _gyr_unit(
     columns: Mapping[str, Mapping[str, Sequence[str]]], values: Mapping[str, Floats], acc_unit: str | None
 ) -> str | None:
-    """The unit in which a body turns as fast as bodies do; None where both would do."""
+    """The unit in which angular rates are plausible for a human body; None if both are."""
     norms, acc = _norms(columns, "gyr", values), _norms(columns, "acc", values)
     if not len(norms) or not len(acc) or acc_unit is None:
         return None

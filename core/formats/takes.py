@@ -1,10 +1,10 @@
-"""Which files of a folder are one take: a study's folder has many, laid out in any way.
+"""Grouping of the files of a folder into recordings: a study has many, in any folder layout.
 
-A file that holds all sensors (a zip, a stored recording, APDM, MVNX, CWA, a phone) is a take. Files of BIDS
-motion are one by subject, session, task and run, whatever their tracking system. Other files of a folder are
-grouped by their names without the last part, where that leaves several in each group ("11-1_lf.txt",
-"11-1_rf.txt"); else the folder is one take. An OpenSense mapping goes with each take of its folder, and so
-does the manifest of the folder or of the nearest one above.
+A file with all sensors (a zip, a stored recording, APDM, MVNX, CWA, a phone) is one recording. BIDS motion
+files are grouped by subject, session, task and run, regardless of the tracking system. Other files of a
+folder are grouped by their names without the last part, if that leaves several in each group ("11-1_lf.txt",
+"11-1_rf.txt"); otherwise the folder is one recording. An OpenSense mapping applies to every recording of its
+folder, and so does the manifest of the folder or of the nearest parent.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ _ENTITY: Final = re.compile(r"(sub|ses|task|run|acq)-([^_]+)")
 
 @dataclass(frozen=True)
 class FoundTake:
-    """Files of one take.
+    """Files of one recording.
 
     Parameters
     ----------
-    name : unique within the folder, with forward slashes. paths : signals and what describes them.
-    labels : what BIDS names say: sub, ses, task, run, acq.
+    name : unique within the folder, with forward slashes. paths : signal and description files. labels :
+        entities of BIDS names: sub, ses, task, run, acq.
     """
 
     name: str
@@ -43,7 +43,7 @@ class FoundTake:
 
 
 def find_takes(root: Path) -> list[FoundTake]:
-    """Takes of a folder and the folders in it, by name; files that hold no signals are left out."""
+    """Recordings in a folder and its subfolders, by name; files without signals are omitted."""
     folders: dict[Path, list[Path]] = {}
     for path in sorted(p for p in root.rglob("*") if p.is_file()):
         if not any(part.startswith(".") for part in path.relative_to(root).parts):
@@ -84,7 +84,9 @@ def _of_folder(root: Path, folder: Path, paths: Sequence[Path]) -> list[FoundTak
 
 
 def _by_name(paths: Sequence[Path]) -> dict[str, list[Path]]:
-    """Files of single sensors by what their names share; all of them, named "", where that tells nothing."""
+    """Single-sensor files by the common part of their names; all of them, named "", if that is not
+    informative.
+    """
     groups: dict[str, list[Path]] = {}
     for path in paths:
         groups.setdefault(_LAST_PART.sub("", _ENDINGS.sub("", path.name)), []).append(path)
@@ -94,7 +96,7 @@ def _by_name(paths: Sequence[Path]) -> dict[str, list[Path]]:
 
 
 def _manifest_of(root: Path, folder: Path) -> Path | None:
-    """The manifest of a folder, or of the nearest one above within the study."""
+    """The manifest of a folder, or of the nearest parent within the study."""
     for at in (folder, *folder.parents):
         if (found := at / MANIFEST).is_file():
             return found
@@ -109,7 +111,9 @@ def _head(path: Path) -> bytes:
 
 
 def _kind_of(path: Path) -> str:
-    """Tell "take" (all sensors in one file), "sensor" (one of several), "mapping", or "" for all else."""
+    """Kind of a file: "take" (all sensors in one file), "sensor" (one of several), "mapping", or "" for
+    others.
+    """
     head = _head(path)
     if is_zip(head) or head.startswith(parquet.MAGIC) or live_reader.looks_like(head):
         return "take"

@@ -1,4 +1,4 @@
-"""Number tables from text, fast: decoding, separators and pyarrow's CSV reader with errors made readable."""
+"""Fast parsing of numeric text tables: decoding, separators and pyarrow's CSV reader with readable errors."""
 
 from __future__ import annotations
 
@@ -35,12 +35,14 @@ class Columns:
     notices: tuple[Notice, ...]
 
     def stack(self, names: Sequence[str]) -> Floats:
-        """Columns side by side, (n, len(names))."""
+        """Columns as an array (n, len(names))."""
         return np.stack([self.values[name] for name in names], axis=-1)
 
 
 def to_utf8(data: bytes) -> bytes:
-    """Strip a byte order mark; turn UTF-16 (Excel's "Unicode text") and Latin-1 into UTF-8; binary passes."""
+    """Strip a byte order mark; convert UTF-16 (Excel's "Unicode text") and Latin-1 to UTF-8; pass binary
+    data through.
+    """
     if data[:3] == b"\xef\xbb\xbf":
         data = data[3:]
     elif data[:2] in (b"\xff\xfe", b"\xfe\xff"):
@@ -55,12 +57,12 @@ def to_utf8(data: bytes) -> bytes:
 
 
 def is_text(data: bytes) -> bool:
-    """Tell text by the absence of NUL in its head."""
+    """Whether the head contains no NUL byte."""
     return b"\0" not in data[:_HEAD]
 
 
 def head_lines(data: bytes, most: int = 64) -> list[bytes]:
-    """First lines without line ends; a line longer than 1 MB is cut."""
+    """First lines without line ends; lines longer than 1 MB are truncated."""
     lines: list[bytes] = []
     at = 0
     while len(lines) < most and at < len(data):
@@ -72,13 +74,13 @@ def head_lines(data: bytes, most: int = 64) -> list[bytes]:
 
 
 def read_separator(first: bytes) -> bytes | None:
-    """What a first line "sep=," names, None without one; a tab may be written as two letters."""
+    """Separator from a first line "sep=,", None without one; a tab may be written as an escape sequence."""
     found = re.match(rb'"?sep=(\\t|[,;\t|])', first)
     return None if found is None else b"\t" if found[1] == rb"\t" else found[1]
 
 
 def after_lines(data: bytes, n: int) -> memoryview:
-    """What follows the first n lines, without a copy."""
+    """The data after the first n lines, without a copy."""
     at = 0
     for _ in range(n):
         at = data.find(b"\n", at) + 1
@@ -88,18 +90,18 @@ def after_lines(data: bytes, n: int) -> memoryview:
 
 
 def split(line: bytes, separator: bytes) -> list[str]:
-    """Cells of a line as text, quotes and blanks stripped."""
+    """Cells of a line as text, without quotes and surrounding blanks."""
     text = line.decode("utf-8", errors="replace")
     return [c.strip().strip('"').strip() for c in text.split(separator.decode())]
 
 
 def first_row(body: memoryview) -> bytes:
-    """First line of rows without a header, as far as it is shorter than 64 kB."""
+    """First line of rows without a header, up to 64 kB."""
     return bytes(body[:_HEAD]).split(b"\n", 1)[0].rstrip(b"\r")
 
 
 def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[str]:
-    """Names of a row's cells where rows end with separators that the header line does not have, or it has."""
+    """Names for the cells of a row if rows and header differ in trailing separators."""
     cells = first_row(body).count(separator) + 1
     named = list(names)
     while len(named) > cells and not named[-1].strip():
@@ -108,7 +110,7 @@ def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[
 
 
 def has_decimal_comma(line: bytes, separator: bytes) -> bool:
-    """Tell "0,074;9,922" from "0.074;9.922"."""
+    """Whether numbers have a decimal comma: "0,074;9,922" rather than "0.074;9.922"."""
     return separator != b"," and b"." not in line and re.search(rb"\d,\d", line) is not None
 
 
@@ -126,13 +128,12 @@ def read_columns(
     Parameters
     ----------
     body : rows, starting at a line start. names : titles of all columns in order. wanted : some of them, or
-        names that `number_columns` gives them.
+        names from `number_columns`.
 
     Raises
     ------
-    FormatError
-        bad_table when most rows do not have the columns of the header, ambiguous_column when several columns
-        have a wanted title.
+    FormatError bad_table if most rows do not have the columns of the header, ambiguous_column if several
+        columns have a wanted title.
     """
     titles, names = names, number_columns(names)
     _check_titles(titles, names, wanted, source)
@@ -146,7 +147,7 @@ def read_columns(
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """A table without its header; `broken` is how many cells the rows have that were left out."""
+    """A table without its header; `broken` is the number of cells in rows that were dropped."""
 
     body: memoryview
     separator: bytes
@@ -156,7 +157,7 @@ class _Table:
     broken: list[int] = field(default_factory=list)
 
     def read(self, kind: pa.DataType) -> pa.Table:
-        """The wanted columns, all of one type; ArrowInvalid where a cell is not of it."""
+        """The wanted columns, all of one type; ArrowInvalid for a cell of another type."""
         self.broken.clear()
         read = pc.ReadOptions(column_names=self.names, use_threads=False, block_size=1 << 22)
         parse = pc.ParseOptions(
@@ -177,7 +178,7 @@ class _Table:
 
 
 def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[str], source: str) -> None:
-    """Raise `ambiguous_column` where several columns have a wanted title."""
+    """Raise `ambiguous_column` if several columns have a wanted title."""
     for name in wanted:
         if name not in names and name in titles:
             raise FormatError(
@@ -189,7 +190,7 @@ def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[
 
 
 def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, list[Notice]]:
-    """The wanted columns, the number of rows, and a notice of cells that are no numbers."""
+    """The wanted columns, the number of rows, and a notice on non-numeric cells."""
     try:
         found = table.read(pa.float64())
         return {n: _as_floats(found[n]) for n in table.wanted}, len(found), []
@@ -209,7 +210,7 @@ def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, li
 
 
 def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> list[Notice]:
-    """A notice of rows without the columns of the header; `bad_table` where most are."""
+    """A notice on rows without the columns of the header; `bad_table` if most are."""
     if rows == 0 or len(broken) > max(2, rows // 2):
         raise FormatError(
             "bad_table",
@@ -232,7 +233,7 @@ def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> 
 
 
 def _as_utf8(body: memoryview) -> memoryview:
-    """The same where it is UTF-8; a text with NUL in its head may be anything behind it."""
+    """The data as valid UTF-8; text with a NUL only after its head may contain anything."""
     if np.frombuffer(body, np.uint8).max(initial=0) < 128:
         return body
     data = bytes(body)
@@ -244,7 +245,7 @@ def _as_utf8(body: memoryview) -> memoryview:
 
 
 def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:
-    """Arrow column to float64 with NaN for null and for what no sensor or clock gives."""
+    """Arrow column to float64 with NaN for null and for values impossible for sensors and clocks."""
     return _plausible(np.array(column.to_numpy(), np.float64))
 
 
@@ -256,7 +257,7 @@ def _plausible(x: Floats) -> Floats:
 def _cell_by_cell(
     found: pa.Table, wanted: Sequence[str], decimal_comma: bool
 ) -> tuple[dict[str, Floats], int]:
-    """Read text cells one by one (damaged file: speed does not matter); count those that are no numbers."""
+    """Parse text cells one by one (damaged file: speed does not matter); count non-numeric ones."""
     bad = 0
     values: dict[str, Floats] = {}
     for name in wanted:
@@ -273,7 +274,7 @@ def _cell_by_cell(
 
 
 def guess_separator(lines: Sequence[bytes]) -> bytes | None:
-    """Separator that cuts all given lines into the same number of cells, the most if several do."""
+    """Separator that splits all given lines into the same number of cells, the most if several do."""
     best, most = None, 1
     for separator in SEPARATORS:
         counts = {line.count(separator) for line in lines if line.strip()}
@@ -283,9 +284,9 @@ def guess_separator(lines: Sequence[bytes]) -> bytes | None:
 
 
 def number_columns(titles: Sequence[str]) -> list[str]:
-    """Return one unique name per column.
+    """One unique name per column.
 
-    A title that several columns share is numbered: "X [s]#1", "X [s]#2", … A blank title becomes "column 3",
+    A title shared by several columns is numbered: "X [s]#1", "X [s]#2", … A blank title becomes "column 3",
     by its position.
     """
     titles = [title or f"column {i}" for i, title in enumerate(titles, 1)]
@@ -305,7 +306,7 @@ def number_columns(titles: Sequence[str]) -> list[str]:
 
 
 def describe_columns(titles: Sequence[str], title: str) -> str:
-    """List the columns that share a title: unique name, position and neighbours of each."""
+    """The columns that share a title: unique name, position and neighbours of each."""
     names = number_columns(titles)
     listed = []
     for i in [i for i, t in enumerate(titles) if t == title]:

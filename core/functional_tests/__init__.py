@@ -1,1 +1,1 @@
-"""Timed functional tests and quiet standing, measured by one sensor on the trunk."""
+"""Timed functional tests and quiet standing, measured with one sensor on the trunk."""

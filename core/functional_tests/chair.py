@@ -1,4 +1,4 @@
-"""Five times sit to stand (docs/science/timed-tests.md, "Five times sit to stand")."""
+"""Five times sit-to-stand test (docs/science/timed-tests.md, "Five times sit to stand")."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from sagittal.core.functional_tests.rising import (
     find_changes,
 )
 from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import CHAIR
 from sagittal.core.plurals import plural
@@ -33,15 +34,15 @@ LONGEST_S: Final = 10.0
 def measure_chair_rises(
     trunk: TrunkMotion, limits: GivenLimits | None = None, rising: RisingParams | None = None
 ) -> FunctionalTest:
-    """Find five rises in a row and measure them.
+    """Detect five consecutive rises and measure them.
 
-    Clinics end the test seated or with the fifth standing: `five_sit_to_stand_s` ends seated,
+    Clinics end the test either seated or with the fifth standing position: `five_sit_to_stand_s` ends seated,
     `five_sit_to_stand_standing_s` standing.
 
     Returns
     -------
-    FunctionalTest; figures have no value and the reason "no_rise" where nobody rises, "too_few_rises" where
-    fewer than five follow each other.
+    FunctionalTest; parameters have no value and the reason "no_rise" without a rise, "too_few_rises" with
+    fewer than five consecutive ones.
     """
     limits = limits or GivenLimits()
     low = -1.0 if limits.start_s is None else limits.start_s
@@ -80,7 +81,11 @@ def measure_chair_rises(
         (
             Notice(
                 "more_rises",
-                f"{more} more {plural(more, 'rise follows', 'rises follow')}; the first five are measured.",
+                Message(
+                    f"{{more}} more {plural(more, 'rise follows', 'rises follow')}; the first five are "
+                    "measured.",
+                    more=more,
+                ),
                 severity="info",
             ),
         )
@@ -92,7 +97,7 @@ def measure_chair_rises(
 
 
 def _row(rises: list[PostureChange]) -> list[PostureChange]:
-    """The longest row of rises that follow each other without a long stay."""
+    """The longest sequence of rises without a long pause."""
     best: list[PostureChange] = []
     row: list[PostureChange] = []
     for rise in rises:
@@ -105,7 +110,7 @@ def _row(rises: list[PostureChange]) -> list[PostureChange]:
 
 
 def _segments(rises: list[PostureChange], changes: list[PostureChange]) -> tuple[TimedSegment, ...]:
-    """Rises and the ways down between and after them."""
+    """Rises, and the sitting down between and after them."""
     if not rises:
         return ()
     last = next((c for c in changes if c.kind == STAND_TO_SIT and c.start_s >= rises[-1].fastest_s), None)

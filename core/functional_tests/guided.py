@@ -1,8 +1,8 @@
-"""A functional test while its samples come: when it may begin, begins and ends, and its figures
-(docs/science/timed-tests.md, "Guided on the live page").
+"""A functional test in real time: readiness, start, end and results (docs/science/timed-tests.md, "Guided on
+the live page").
 
-The figures are those of a file: the same functions measure the samples so far, at fixed samples of the axis.
-So the result is a function of the samples and not of the blocks in which they came.
+The results are those of a file: the same functions measure the samples so far, at fixed samples of the axis.
+The result therefore depends only on the samples and not on their division into blocks.
 """
 
 from __future__ import annotations
@@ -45,16 +45,17 @@ REST: Final = QuietParams()
 
 @dataclass(frozen=True)
 class LiveTestParams:
-    """When the phases of a guided test change (our choices).
+    """Phase transitions of a guided test (our choices).
 
     Parameters
     ----------
-    tick_s : time between judgements; look_s : between measurements of what came so far, in whole ticks.
-    quiet_s : rest before the person may begin; standing_s : before a walk, as calibration asks for.
-    still_s : rest without a rise or a step after which a movement was none of the test, and rest that ends
-        ten metres. settle_s : after the end of a test, until it is shown. final_s : until nothing of it
-        changes any more: as far as the detectors look back. longest_s : a trial without an end.
-    kept_s : samples kept before a trial. stand_s : quiet standing that is measured.
+    tick_s : interval of state updates. look_s : interval of measurements on the data so far, in whole ticks.
+    quiet_s : required rest before the start. standing_s : before a walk, as required for calibration.
+    still_s : rest without a rise or a step after which a movement is discarded as not part of the test, and
+        rest that ends the ten-metre walk. settle_s : delay between the end of a test and its display.
+        final_s : delay until the result is final: the look-back of the detectors. longest_s : timeout of a
+        trial without an end.
+    kept_s : duration of samples retained before a trial. stand_s : duration of quiet standing to measure.
     """
 
     tick_s: float = 0.25
@@ -72,13 +73,13 @@ class LiveTestParams:
 
 
 class GuidedTest:
-    """The trial of a test that is going on.
+    """The current trial of a test.
 
     Parameters
     ----------
-    columns : segments of the blocks' columns. subject : of the recording that is measured.
+    columns : segments of the block columns. subject : of the recording.
 
-    `push` only keeps the samples; `advance` judges them and takes milliseconds once a second.
+    `push` only stores the samples; `advance` evaluates them, which takes milliseconds once per second.
     """
 
     def __init__(
@@ -118,21 +119,21 @@ class GuidedTest:
         strides: Sequence[LiveStride] = (),
         events: Sequence[GaitEvent] = (),
     ) -> None:
-        """Keep the next samples, and what the live chain says of them."""
+        """Store the next samples, with the strides and events of the live chain."""
         self._kept.append(block, self._columns)
         if self.protocol in WALK_TESTS:
             self._strides += strides
             self._events += events
 
     def go(self) -> None:
-        """Let quiet standing begin as soon as the person stands still; other tests begin by themselves."""
+        """Start quiet standing as soon as the person stands still; other tests start automatically."""
         self._asked = True
         if self._phase == "get_ready" and self.protocol in STANDING_TESTS:
             self._phase = "ready"
             self.view = self._show()
 
     def repeat(self) -> None:
-        """Drop the trial, and begin with the next sample that is pushed."""
+        """Discard the trial, and restart with the next sample pushed."""
         self._judged = self._kept.end - self._kept.end % self._tick
         self._asked = self.protocol not in STANDING_TESTS
         self._begin_anew(self._kept.end, None)
@@ -140,21 +141,21 @@ class GuidedTest:
         self._events.clear()
 
     def correct(self, limits: GivenLimits) -> None:
-        """Measure the trial that is done from and to the times that a person says, s of the axis."""
+        """Measure the finished trial between manually given times, s of the axis."""
         self._limits = limits
         if self._phase == "done":
             self._look(self._judged)
             self.view = self._show(final=self.view.final)
 
     def advance(self) -> GuidedTestView:
-        """Judge the samples that have come."""
+        """Evaluate the samples so far."""
         while self._judged + self._tick <= self._kept.end:
             self._judged += self._tick
             self._judge(self._judged)
         return self.view
 
     def _judge(self, at: int) -> None:
-        """Decide at one sample of the axis."""
+        """Evaluate at one sample of the axis."""
         if not self._watched:
             self.view = self._show("segments_missing")
             return
@@ -172,7 +173,7 @@ class GuidedTest:
         self.view = self._show(problem, final=final)
 
     def _wait(self, at: int, problem: str | None) -> str | None:
-        """Is the person quiet; has the person begun?"""
+        """Check for rest, and for the start of the test."""
         p, rate = self.params, self._rate
         low = max(self._from, at - round(p.kept_s * rate))
         self._kept.drop_before(low)
@@ -194,7 +195,7 @@ class GuidedTest:
         self._phase, self._moved, self._looked = "running", at, None
 
     def _run(self, at: int) -> str | None:
-        """Is the test over?"""
+        """Check for the end of the test."""
         p, rate = self.params, self._rate
         if self.protocol in STANDING_TESTS:
             return self._stand(at)
@@ -219,7 +220,7 @@ class GuidedTest:
         return None
 
     def _is_over(self, test: FunctionalTest, at: int, quiet: float) -> bool:
-        """Whether the test has ended, by its own definition or because the person rests for long."""
+        """Whether the test has ended, by its definition or after a long rest."""
         p, now = self.params, at / self._rate
         if self.protocol == "walk_10m":
             return quiet >= p.still_s
@@ -235,14 +236,14 @@ class GuidedTest:
         return (whole and settled) or (bool(_rises(test)) and quiet >= LONGEST_S)
 
     def _is_early(self, at: int) -> bool:
-        """Whether the minutes of a walk that has begun are not over: nothing to measure yet."""
+        """Whether a timed walk is still running, with nothing to measure yet."""
         seconds, test = self._seconds(), self._looked
         if seconds is None or test is None or test.start_s is None:
             return False
         return at / self._rate < test.start_s + seconds + self.params.settle_s
 
     def _stand(self, at: int) -> str | None:
-        """Quiet standing: long enough, or broken off."""
+        """Quiet standing: completed, or interrupted."""
         p, rate = self.params, self._rate
         if not self._stands(at):
             self._begin_anew(at, "stepped")
@@ -257,7 +258,7 @@ class GuidedTest:
         return None
 
     def _stands(self, at: int) -> bool:
-        """Whether the person has stood quietly over the last seconds."""
+        """Whether the person has been in quiet standing over the last seconds."""
         low = max(self._from, at - round((self.params.quiet_s + 1.0) * self._rate))
         take = self._recording(low, at)
         windows = find_rest_windows(take, STANDING_QUIETLY, self._watched)
@@ -265,7 +266,7 @@ class GuidedTest:
         return any(b > end - 0.5 and b - a >= self.params.quiet_s for a, b in windows)
 
     def _begin_anew(self, at: int, problem: str | None) -> None:
-        """Wait again, with the samples from this one on."""
+        """Return to the waiting phase, with the samples from this one on."""
         asked = self._asked and self.protocol in STANDING_TESTS
         self._phase, self._looked, self._limits = "ready" if asked else "get_ready", None, GivenLimits()
         if problem is not None or at >= self._kept.end:
@@ -274,7 +275,7 @@ class GuidedTest:
         self.view = self._show(problem)
 
     def _look(self, at: int) -> None:
-        """Measure what came so far, as a file of it would be."""
+        """Measure the samples so far, as for a file."""
         try:
             self._looked = self._measure(at)
         except EstimationError:
@@ -304,7 +305,7 @@ class GuidedTest:
         return shift_test(measure_chair_rises(trunk, given, p.rising), zero)
 
     def _gait(self, at: int) -> MeasuredGait:
-        """What the live strides say of the walk since the person moved."""
+        """Gait of the walk so far from the live strides."""
         now, since = at / self._rate, self._moved / self._rate - 1.0
         told: dict[int, LiveStride] = {}
         for s in self._strides:
@@ -325,13 +326,15 @@ class GuidedTest:
         return MeasuredGait(steps, Strides(strides), (), columns, find_bouts(steps), turns)
 
     def _recording(self, low: int, at: int) -> UniformRecording:
-        """Samples of the axis as a take of their own."""
+        """Samples of the axis as a separate recording."""
         sensors = self._kept.cut(low, at, self._watched)
         t_s = np.arange(at - low) / self._rate
         return UniformRecording(t_s, self._rate, sensors, self._subject, self.protocol, {})
 
     def _quiet_s(self, low: int, at: int, most_s: float) -> float:
-        """How long all watched sensors have been quiet (core/signals/rest.py), s; looked for over so long."""
+        """How long all monitored sensors have been quiet (core/signals/rest.py), s; limited to the search
+        window.
+        """
         low = max(low, at - round((most_s + REST.window_s) * self._rate), self._kept.first)
         quiet = np.ones(at - low, np.bool_)
         for sensor in self._kept.cut(low, at, self._watched).values():

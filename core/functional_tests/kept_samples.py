@@ -1,4 +1,4 @@
-"""What sensors measured lately, as a guided test keeps it while its samples come."""
+"""Recent sensor samples retained by a guided test in real time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagittal.core.timeline.live import UniformBlock
 
 
 class KeptSamples:
-    """The last samples of some columns, at their places of the axis."""
+    """The last samples of some columns, indexed by the axis."""
 
     def __init__(self, columns: int) -> None:
         self.first = self.end = 0
@@ -22,7 +22,7 @@ class KeptSamples:
         self._flags = np.zeros((1 << 10, columns, 2), np.bool_)
 
     def append(self, block: UniformBlock, columns: np.ndarray[Any, Any]) -> None:
-        """Take the next samples of the axis."""
+        """Append the next samples of the axis."""
         n = len(block)
         if self._size + n > len(self._signals):
             self._grow(n)
@@ -35,11 +35,11 @@ class KeptSamples:
         self.end = block.first + n
 
     def drop_before(self, at: int) -> None:
-        """Forget what is before a sample of the axis."""
+        """Discard all samples before one of the axis."""
         self.first = max(self.first, min(at, self.end))
 
     def cut(self, low: int, at: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
-        """Copies of what the sensors measured."""
+        """Copies of the sensor signals in a range."""
         k = self._span(low, at)
         signals, flags = self._signals[k], self._flags[k]
         found: dict[Segment, SensorSignals] = {}
@@ -53,7 +53,7 @@ class KeptSamples:
         return slice(max(0, max(low, self.first) - zero), max(0, at - zero))
 
     def _grow(self, n: int) -> None:
-        """Make room: drop what was forgotten, then double until it fits."""
+        """Make room: reclaim discarded samples, then double the capacity until it suffices."""
         used = self.end - self.first
         length = len(self._signals)
         while used + n > length // 2:

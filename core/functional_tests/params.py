@@ -1,4 +1,4 @@
-"""Parameters of everything that is done with a functional test."""
+"""Parameters of all functional tests."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sagittal.core.functional_tests.walks import WalkTestParams
 
 @dataclass(frozen=True)
 class FunctionalTestParams:
-    """Of the rises, of quiet standing and of the walk tests; turns are those of `PipelineConfig.turns`."""
+    """Parameters of rises, quiet standing and walk tests; turns use `PipelineConfig.turns`."""
 
     rising: RisingParams = field(default_factory=RisingParams)
     sway: SwayParams = field(default_factory=SwayParams)

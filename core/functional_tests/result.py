@@ -1,4 +1,4 @@
-"""What a functional test gives: when it began and ended, its segments and its parameters."""
+"""Result of a functional test: start, end, segments and parameters."""
 
 from __future__ import annotations
 
@@ -30,13 +30,12 @@ class TimedSegment:
 
 @dataclass(frozen=True, eq=False)
 class FunctionalTest:
-    """A functional test as measured.
+    """Measured functional test.
 
     Parameters
     ----------
-    start_s, end_s : of the test; None where they were not found. segments : its parts in order of time.
-    sensor : the trunk sensor that tells, None where feet alone do.
-    corrected : a person said when it began or ended.
+    start_s, end_s : of the test; None if not detected. segments : its parts in chronological order. sensor :
+        trunk sensor used, None for feet only. corrected : start or end were given manually.
     """
 
     start_s: float | None
@@ -51,11 +50,11 @@ class FunctionalTest:
 def state_figures(
     values: Mapping[str, float | None], names: tuple[str, ...], reason: str | None
 ) -> tuple[Parameter, ...]:
-    """A row for every name of a test: its value with what it is known to, or the reason why it has none.
+    """One row for every parameter of a test: its value with uncertainty, or the reason why it has none.
 
     Parameters
     ----------
-    values : by name, in the unit of the name. reason : of those that are missing or None.
+    values : by name, in the unit of the name. reason : for those missing or None.
     """
     return tuple(_state(name, values.get(name), reason) for name in names)
 
@@ -85,14 +84,14 @@ has stopped."""
 
 @dataclass(frozen=True, eq=False)
 class GuidedTestView:
-    """Where a guided test stands after the samples so far (core/functional_tests/guided.py).
+    """State of a guided test after the samples so far (core/functional_tests/guided.py).
 
     Parameters
     ----------
-    t_s : of the last sample that was judged. start_s, end_s : of the trial, as far as known.
-    rises : from the chair, so far. seconds : how long the test lasts, None where the person ends it.
-    result : at the end. final : later samples do not change it. problem : why there is none, or why it began
-        anew: a code.
+    t_s : of the last evaluated sample. start_s, end_s : of the trial, as far as known. rises : from the
+        chair, so far. seconds : fixed duration of the test, None if the person ends it. result : at the end.
+        final : later samples do not change it. problem : code of the reason for a missing result or a
+        restart.
     """
 
     protocol: Protocol
@@ -108,7 +107,7 @@ class GuidedTestView:
 
 
 def shift_test(test: FunctionalTest, by_s: float) -> FunctionalTest:
-    """The same test on an axis that begins so much earlier, s."""
+    """The same test on an axis that begins earlier by this time, s."""
 
     def later(t_s: float | None) -> float | None:
         return None if t_s is None else t_s + by_s

@@ -1,9 +1,9 @@
-"""Rising from a chair and sitting down, from the trunk's height and lean
+"""Detection of rising from a chair and sitting down, from the height and inclination of the trunk
 (docs/science/timed-tests.md, "Rising and sitting down").
 
-Where the trunk goes up or down by a good part of a thigh's length, and leans forward and back meanwhile, a
-person rises or sits down. The change lasts from where the trunk leans forward at a tenth of its greatest rate
-to where it leans back at less than a tenth of that.
+If the trunk moves up or down by a considerable part of the thigh length, while leaning forward and back, the
+person rises or sits down. The transition lasts from where the trunk leans forward at a tenth of its maximum
+rate to where it leans back at less than a tenth of that.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ MARGINS_S: Final = (0.0, 0.1, 0.2, 0.3, 0.4)
 
 @dataclass(frozen=True)
 class RisingParams:
-    """What counts as rising or sitting down (our choices).
+    """Criteria for rising and sitting down (our choices).
 
     Parameters
     ----------
-    height_m : least change of the trunk's height. speed_mps : least vertical speed of it, low-passed.
-    lean_rad : least lean forward and back. edge : share of the greatest rate of leaning forward, and back, at
-        which the change begins and ends.
-    band_hz : of the vertical speed in which changes are looked for: above drift, below steps.
-    lean_hz : cutoff of the lean. reach_s : the lean belongs to a change within so long of its fastest moment.
+    height_m : minimum change of trunk height. speed_mps : minimum vertical speed, low-passed. lean_rad :
+        minimum lean forward and back. edge : fraction of the maximum rate of leaning forward, and back, at
+        which the transition begins and ends.
+    band_hz : of the vertical speed used for detection: above drift, below steps. lean_hz : cut-off of the
+        lean. reach_s : largest distance of the lean from the fastest moment.
     """
 
     height_m: float = 0.12
@@ -53,13 +53,13 @@ class RisingParams:
 
 @dataclass(frozen=True)
 class PostureChange:
-    """One rise or one way down.
+    """One rising or sitting down.
 
     Parameters
     ----------
-    start_s, end_s : first and last visible lean. fastest_s : the greatest vertical speed.
-    height_m : change of the trunk's height, positive up. lean_rad : greatest lean forward against where it
-        began. forward_rad_s, back_rad_s : greatest rates of leaning forward and of coming up, positive.
+    start_s, end_s : start and end of the lean. fastest_s : time of maximum vertical speed. height_m : change
+        of trunk height, positive up. lean_rad : maximum forward lean relative to the start. forward_rad_s,
+        back_rad_s : maximum rates of leaning forward and back, positive.
     """
 
     kind: ChangeKind
@@ -73,12 +73,12 @@ class PostureChange:
 
     @property
     def duration_s(self) -> float:
-        """Length of the change, s."""
+        """Duration of the transition, s."""
         return self.end_s - self.start_s
 
 
 def find_changes(trunk: TrunkMotion, params: RisingParams | None = None) -> tuple[PostureChange, ...]:
-    """Rises and ways down of a take, in order of time."""
+    """All rising and sitting down in a recording, in chronological order."""
     params = params or RisingParams()
     rate = trunk.rate_hz
     if len(trunk.t_s) < rate * 3.0:
@@ -99,7 +99,7 @@ def find_changes(trunk: TrunkMotion, params: RisingParams | None = None) -> tupl
 def _cut_out(
     found: list[tuple[int, float]], i: int, speed: Floats, rate_hz: float, params: RisingParams
 ) -> tuple[int, int]:
-    """Samples around one fastest moment in which no other change of its size has its own."""
+    """Samples around one fastest moment that contain no other transition of its size."""
     at, _ = found[i]
     reach = round(params.reach_s * rate_hz)
     rivals = [k for k, _ in found if k != at and abs(speed[k]) >= 0.5 * abs(speed[at])]
@@ -110,7 +110,7 @@ def _cut_out(
 
 
 def _vertical_speed(trunk: TrunkMotion, params: RisingParams) -> Floats:
-    """Vertical speed (n,) in m/s between drift and steps."""
+    """Vertical speed (n,) in m/s, band-passed between drift and steps."""
     low, high = params.band_hz
     speed = np.cumsum(trunk.upward) / trunk.rate_hz
     return low_pass(speed - low_pass(speed, low, trunk.rate_hz), high, trunk.rate_hz)
@@ -119,7 +119,7 @@ def _vertical_speed(trunk: TrunkMotion, params: RisingParams) -> Floats:
 def _measure(
     trunk: TrunkMotion, at: int, sign: float, part: tuple[int, int], params: RisingParams
 ) -> PostureChange | None:
-    """The change around its fastest sample; None where trunk and lean say that it is none."""
+    """The transition around its fastest sample; None if trunk height and lean contradict it."""
     rate, (low, high) = trunk.rate_hz, part
     if high - low < 0.5 * rate:
         return None
@@ -152,10 +152,10 @@ def _measure(
 
 
 def _lean(trunk: TrunkMotion, low: int, high: int, params: RisingParams) -> Floats:
-    """Lean (n,) in rad in the plane in which the trunk leans most, forward positive.
+    """Lean (n,) in rad in the plane of the largest lean, forward positive.
 
-    A trunk bows and comes back within a change, so that the larger excursion from the line between its ends
-    is forward.
+    The trunk leans forward and back within a transition, so the larger excursion from the line between its
+    ends is forward.
     """
     up = low_pass(trunk.up[low:high].T, params.lean_hz, trunk.rate_hz).T
     ramp = np.linspace(0.0, 1.0, len(up))[:, None]
@@ -168,7 +168,7 @@ def _lean(trunk: TrunkMotion, low: int, high: int, params: RisingParams) -> Floa
 
 
 def _greatest_lean(lean: Floats, speed: Floats, at: int, rate_hz: float) -> int | None:
-    """Sample of the greatest lean, near the fastest moment of the height."""
+    """Sample of the maximum lean, near the fastest vertical movement."""
     near = round(1.5 * rate_hz)
     low, high = max(1, at - near), min(len(lean) - 1, at + near)
     if high - low < 3:
@@ -180,7 +180,7 @@ def _greatest_lean(lean: Floats, speed: Floats, at: int, rate_hz: float) -> int 
 def _height_change(trunk: TrunkMotion, start: int, end: int) -> float:
     """Change of height in m: the vertical acceleration integrated twice between two slow moments.
 
-    How slow they are is not known, so that it is the median over several margins.
+    Their residual speed is unknown, so the median over several margins is used.
     """
     heights = []
     for margin in MARGINS_S:

@@ -30,13 +30,14 @@ F_95: Final = 3.0
 
 @dataclass(frozen=True)
 class SwayParams:
-    """Of quiet standing.
+    """Parameters of quiet standing.
 
     Parameters
     ----------
-    shortest_s : of standing that is measured; longest_s : of it, the middle is taken (our choices).
-    cutoff_hz : of the acceleration (Mancini et al. 2012). drift_hz : below it nothing is integrated.
-    noise_share : share of a figure's power that the sensor's own noise may have.
+    shortest_s : minimum duration of standing. longest_s : maximum duration, taken from its middle (our
+        choices).
+    cutoff_hz : of the acceleration (Mancini et al. 2012). drift_hz : lower limit of integration.
+        noise_share : maximum fraction of sensor noise in the power of a parameter.
     """
 
     shortest_s: float = 20.0
@@ -49,12 +50,12 @@ class SwayParams:
 def measure_sway(
     recording: UniformRecording, limits: GivenLimits | None = None, params: SwayParams | None = None
 ) -> FunctionalTest:
-    """Find the longest quiet standing and measure its sway.
+    """Detect the longest quiet standing and measure its sway.
 
     Returns
     -------
-    FunctionalTest; figures have no value and the reason "standing_too_short" where nobody stands quietly for
-    long enough, "noise_dominated" where the sensor's own noise makes too much of them.
+    FunctionalTest; parameters have no value and the reason "standing_too_short" without sufficiently long
+    quiet standing, "noise_dominated" if the fraction of sensor noise is too large.
 
     Raises
     ------
@@ -80,9 +81,9 @@ def measure_sway(
 
 
 def project_horizontally(acc: Floats) -> Floats:
-    """Two horizontal components (n, 2) in m/s² of a specific force (n, 3), their mean taken off.
+    """Two horizontal components (n, 2) in m/s² of a specific force (n, 3), with their mean subtracted.
 
-    Vertical is where the force points on average; which way is forward nobody knows.
+    The vertical is the mean direction of the force; the heading is undetermined.
     """
     mean = acc.mean(axis=0)
     norm = float(np.linalg.norm(mean))
@@ -94,7 +95,7 @@ def project_horizontally(acc: Floats) -> Floats:
 def measure_figures(
     plane: Floats, rate_hz: float, params: SwayParams
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """Figures of a horizontal acceleration (n, 2), and the share of each that is the sensor's noise."""
+    """Sway parameters of a horizontal acceleration (n, 2), and the fraction of sensor noise in each."""
     acc = low_pass(plane.T, params.cutoff_hz, rate_hz).T
     acc = acc - acc.mean(axis=0)
     n = len(acc)
@@ -129,7 +130,7 @@ def measure_figures(
 def _choose(
     recording: UniformRecording, segment: str, limits: GivenLimits, params: SwayParams
 ) -> Window | None:
-    """The longest quiet standing within what a person said; None where it is too short."""
+    """The longest quiet standing within the manually given limits; None if too short."""
     low = 0.0 if limits.start_s is None else limits.start_s
     high = float(recording.t_s[-1]) if limits.end_s is None else limits.end_s
     found = find_rest_windows(recording, STANDING_QUIETLY, (segment,))  # type: ignore[arg-type]
@@ -143,7 +144,7 @@ def _choose(
 
 
 def _spectrum(acc: Floats, rate_hz: float) -> tuple[Floats, Floats]:
-    """Frequencies and power density of both components together, (m/s²)²/Hz."""
+    """Frequencies and total power density of both components, (m/s²)²/Hz."""
     from scipy.signal import periodogram
 
     frequencies, power = periodogram(acc, rate_hz, window="hann", axis=0)
@@ -151,7 +152,9 @@ def _spectrum(acc: Floats, rate_hz: float) -> tuple[Floats, Floats]:
 
 
 def _noise_density(plane: Floats, rate_hz: float) -> float:
-    """Power density in (m/s²)²/Hz of both components where no body sways; 0 below 25 Hz: none is seen."""
+    """Noise power density in (m/s²)²/Hz of both components above body sway; 0 below 25 Hz, where it cannot
+    be determined.
+    """
     if rate_hz < 25.0:
         return 0.0
     frequencies, power = _spectrum(plane, rate_hz)

@@ -1,7 +1,7 @@
-"""How the trunk moves, by one sensor on pelvis or chest that may sit anyhow: no calibration.
+"""Motion of the trunk from one sensor on pelvis or chest in any orientation, without calibration.
 
-The vertical comes from the filter of core/fusion/attitude.py, the gyroscope's bias from the longest rest of
-the sensor. docs/science/timed-tests.md, "Motion of the trunk".
+The vertical comes from the filter of core/fusion/attitude.py, the gyroscope bias from the longest rest of the
+sensor. docs/science/timed-tests.md, "Motion of the trunk".
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
 from sagittal.core.fusion.attitude import AttitudeParams, estimate_orientation
+from sagittal.core.message import Message
 from sagittal.core.rotation import exp, find_vertical
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import find_rest_windows, index_window
@@ -26,13 +27,13 @@ UP: Final = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True, eq=False)
 class TrunkMotion:
-    """A trunk sensor over a take.
+    """A trunk sensor over a recording.
 
     Parameters
     ----------
-    t_s : (n,). up : (n, 3) the vertical in axes of the sensor. acc : (n, 3) free of gravity, sensor axes,
-        m/s². gyr : (n, 3) rad/s without bias. valid : (n,).
-    rests : windows in which the sensor was still, s.
+    t_s : (n,). up : (n, 3) the vertical in sensor axes. acc : (n, 3) gravity-free, sensor axes, m/s². gyr :
+        (n, 3) rad/s, bias-corrected. valid : (n,).
+    rests : windows with the sensor still, s.
     """
 
     segment: Segment
@@ -51,12 +52,12 @@ class TrunkMotion:
 
     @property
     def yaw_rate(self) -> Floats:
-        """Turning about the vertical (n,), rad/s, left positive."""
+        """Yaw rate (n,), rad/s, left positive."""
         return np.asarray(np.einsum("ni,ni->n", self.gyr, self.up))
 
 
 def find_trunk_sensor(recording: UniformRecording) -> Segment:
-    """The segment whose sensor tells how the trunk moves; raises EstimationError `segments_missing`."""
+    """Segment of the trunk sensor to use; raises EstimationError `segments_missing`."""
     for segment in TRUNK:
         if segment in recording.sensors and recording.sensors[segment].valid.any():
             return segment
@@ -67,11 +68,11 @@ def find_trunk_sensor(recording: UniformRecording) -> Segment:
 
 
 def follow_trunk(recording: UniformRecording) -> TrunkMotion:
-    """Follow the trunk through a take.
+    """Track the trunk through a recording.
 
     Raises
     ------
-    EstimationError `segments_missing` without a sensor on pelvis or chest; `no_rest` where it never rests.
+    EstimationError `segments_missing` without a sensor on pelvis or chest; `no_rest` without any rest.
     """
     segment = find_trunk_sensor(recording)
     signals, rate = recording.sensors[segment], recording.rate_hz
@@ -79,8 +80,11 @@ def follow_trunk(recording: UniformRecording) -> TrunkMotion:
     if not rests:
         raise EstimationError(
             "no_rest",
-            f"The sensor on the {segment} never rests for a second. Let the person sit or stand still for a"
-            " few seconds before the test begins.",
+            Message(
+                "The sensor on the {segment} never rests for a second. Let the person sit or stand "
+                "still for a few seconds before the test begins.",
+                segment=segment,
+            ),
             sensor=segment,
         )
     longest = index_window(max(rests, key=lambda r: r[1] - r[0]), rate)
@@ -96,7 +100,7 @@ def follow_trunk(recording: UniformRecording) -> TrunkMotion:
 
 
 def _level(up: Floats) -> Floats:
-    """Shortest turn (4,) that takes a unit vector (3,) to the vertical."""
+    """Shortest rotation (4,) that maps a unit vector (3,) to the vertical."""
     axis = np.cross(up, UP)
     sine = float(np.linalg.norm(axis))
     if sine < 1e-9:

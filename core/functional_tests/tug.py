@@ -16,6 +16,7 @@ from sagittal.core.functional_tests.rising import (
     find_changes,
 )
 from sagittal.core.functional_tests.trunk import TrunkMotion
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_names
 from sagittal.core.parameters.catalogue.entry import TUG
 from sagittal.core.plurals import plural
@@ -36,12 +37,12 @@ def measure_tug(
     rising: RisingParams | None = None,
     turning: TurnParams | None = None,
 ) -> FunctionalTest:
-    """Find and measure a timed up and go.
+    """Detect and measure a timed up and go test.
 
     Returns
     -------
-    FunctionalTest; figures have no value and the reason "no_rise" where nobody rises, "no_sit_down" where
-    nobody sits down again, "turn_missing" where less than two half turns lie between.
+    FunctionalTest; parameters have no value and the reason "no_rise" without a rise, "no_sit_down" without
+    sitting down again, "turn_missing" with fewer than two half turns in between.
     """
     limits = limits or GivenLimits()
     changes = [c for c in find_changes(trunk, rising) if _inside(c, limits)]
@@ -79,14 +80,14 @@ def measure_tug(
             "tug_final_turn_velocity_dps": degrees(last.peak_rad_s),
         }
     more = sum(c.kind == SIT_TO_STAND and c.start_s >= end for c in changes)
-    again = plural(more, ONCE_MORE, AGAIN.format(n=more))
+    again = plural(more, ONCE_MORE, Message(AGAIN, n=more))
     told = (Notice("more_tests", again, severity="info"),) if more else ()
     rows = state_figures(values, NAMES, "turn_missing" if len(between) < 2 else "no_rise")
     return FunctionalTest(start, end, segments, rows, trunk.segment, corrected, told)
 
 
 def _cut(start: float, end: float, rise: PostureChange, first: Turn, last: Turn) -> tuple[TimedSegment, ...]:
-    """The five segments; who turns before having risen walks out for no time."""
+    """The five segments; the walk out has zero duration if the turn starts before rising has ended."""
     marks = [start, rise.end_s, first.start_s, first.end_s, last.start_s, end]
     for i in range(1, len(marks)):
         marks[i] = max(marks[i], marks[i - 1])
@@ -95,7 +96,7 @@ def _cut(start: float, end: float, rise: PostureChange, first: Turn, last: Turn)
 
 
 def _inside(change: PostureChange, limits: GivenLimits) -> bool:
-    """Is the fastest moment of a change within what a person said?"""
+    """Whether the fastest moment of a transition is within the manually given limits."""
     low = -1.0 if limits.start_s is None else limits.start_s
     return low < change.fastest_s and (limits.end_s is None or change.fastest_s < limits.end_s)
 
@@ -103,7 +104,7 @@ def _inside(change: PostureChange, limits: GivenLimits) -> bool:
 def _choose(
     changes: list[PostureChange], turns: tuple[Turn, ...]
 ) -> tuple[PostureChange | None, PostureChange | None]:
-    """The first rise and the next way down with a half turn between; else the first rise that was found."""
+    """The first rise and the next sitting down with a half turn in between; else the first rise."""
     rises = [c for c in changes if c.kind == SIT_TO_STAND]
     for rise in rises:
         down = next((c for c in changes if c.kind == STAND_TO_SIT and c.start_s >= rise.end_s), None)

@@ -1,7 +1,7 @@
 """Ten-metre and six-minute walk tests from the strides of the feet (docs/science/timed-tests.md).
 
-The way of a foot grows by the length of each of its strides, evenly within it; the way of the person is the
-mean of the feet's.
+The distance covered by a foot increases by the length of each of its strides, linearly within a stride; the
+distance of the person is the mean of both feet.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ LENGTH: Final = "stride_length_m"
 
 @dataclass(frozen=True)
 class WalkTestParams:
-    """Of both walk tests.
+    """Parameters of both walk tests.
 
     Parameters
     ----------
-    cut_m : metres at either end of the ten-metre walk in which a person speeds up and slows down.
-    least_m : shortest timed distance. seconds, minute_s : of the six-minute walk and of its parts.
-    short_s : a six-minute walk may be so much shorter.
+    cut_m : acceleration and deceleration distance at either end of the ten-metre walk. least_m : shortest
+        timed distance. seconds, minute_s : duration of the six-minute walk and of its parts. short_s :
+        tolerance for a shorter six-minute walk.
     """
 
     cut_m: float = 2.0
@@ -49,26 +49,26 @@ class WalkTestParams:
 
 @dataclass(frozen=True, eq=False)
 class WalkedWay:
-    """Way (m,) in m at times (m,) in s, both increasing, straight between."""
+    """Distance (m,) in m at times (m,) in s, both increasing, with linear interpolation."""
 
     t_s: Floats
     way_m: Floats
 
     def at(self, t_s: float) -> float:
-        """Way at a time, m."""
+        """Distance at a time, m."""
         return float(np.interp(t_s, self.t_s, self.way_m))
 
     def when(self, way_m: float) -> float:
-        """First time at which a way is reached, s."""
+        """First time at which a distance is reached, s."""
         return float(np.interp(way_m, self.way_m, self.t_s))
 
 
 def follow_way(
     strides: Strides, lengths: Sequence[float | None], start_s: float, end_s: float
 ) -> WalkedWay | None:
-    """The way of the feet from one time to another; None where a foot has no length of any stride.
+    """Distance of the feet over a time range; None if a foot has no stride with a known length.
 
-    A stride whose length is not known counts as the median of its foot: the person walked on.
+    A stride of unknown length is assigned the median of its foot: the person continued walking.
     """
     grid = np.union1d(np.arange(start_s, end_s, 0.1), [end_s])
     ways = []
@@ -99,8 +99,8 @@ def measure_ten_metres(
 
     Returns
     -------
-    FunctionalTest; no values and the reason "no_bouts" where nobody walked, "no_foot_track" without the
-    lengths of strides, "walk_too_short" where too little is left between the ends.
+    FunctionalTest; no values and the reason "no_bouts" without walking, "no_foot_track" without stride
+    lengths, "walk_too_short" if too little distance remains between the ends.
     """
     params, limits = params or WalkTestParams(), limits or GivenLimits()
     corrected = limits.start_s is not None or limits.end_s is not None
@@ -134,8 +134,8 @@ def measure_six_minutes(
 
     Returns
     -------
-    FunctionalTest; no values and the reason "no_bouts" where nobody walked, "walk_too_short" where the take
-    ends too early; distances have "no_foot_track" without the lengths of strides.
+    FunctionalTest; no values and the reason "no_bouts" without walking, "walk_too_short" if the recording
+    ends too early; distances have "no_foot_track" without stride lengths.
     """
     params, limits = params or WalkTestParams(), limits or GivenLimits()
     corrected = limits.start_s is not None or limits.end_s is not None
@@ -176,7 +176,7 @@ def _lengths(measured: MeasuredGait) -> Column:
 
 
 def _longest_straight(measured: MeasuredGait, limits: GivenLimits) -> tuple[float, float] | None:
-    """The longest walk, between its ends and the turns in it, within what a person said."""
+    """The longest walk without a turn, within the manually given limits."""
     low = -np.inf if limits.start_s is None else limits.start_s
     high = np.inf if limits.end_s is None else limits.end_s
     spans = []
@@ -190,6 +190,6 @@ def _longest_straight(measured: MeasuredGait, limits: GivenLimits) -> tuple[floa
 
 
 def _within(bout: Bout, start: float, end: float) -> list[tuple[float, float]]:
-    """Stops of a bout inside the test."""
+    """Stops of a bout within the test."""
     cut = [(max(a, start), min(b, end)) for a, b in bout.stops]
     return [(a, b) for a, b in cut if b > a]

@@ -1,1 +1,1 @@
-"""CalibratedRecording → Orientations: the attitude of each sensor, then relative headings without drift."""
+"""CalibratedRecording → Orientations: the attitude of each sensor, then drift-free relative headings."""

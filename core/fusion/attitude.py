@@ -1,16 +1,15 @@
-"""Tilt and turn of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
+"""Attitude of one sensor: the explicit complementary filter, six axes, gyro bias already removed.
 
 Mahony, Hamel and Pflimlin 2008 (IEEE TAC 53(5)), eq 32 with k_I = 0: q̇ = ½ q ⊗ (ω + k_P e), e = a × â, where
 â = R(q)ᵀ e₃ is the predicted vertical and a the specific force. Two differences, both for walking:
-- a is divided by its norm at rest, not by its own (docs/science/orientation.md, "Departures from the paper").
-  Over a stride the horizontal acceleration averages to zero; divided by its own norm it does not and pulls
-  the vertical aside.
-- the integral term is left out: without a magnetometer the bias about the vertical is unobservable and runs
-  away. The bias is the mean over rest. Heading is only as good as the
-  gyroscope.
+- a is divided by its norm at rest, not by its current norm (docs/science/orientation.md, "Departures from the
+  paper"). Over a stride the horizontal acceleration averages to zero; divided by the current norm it does
+  not, and biases the vertical.
+- the integral term is omitted: without a magnetometer the bias about the vertical is unobservable and
+  diverges. The bias is the mean over rest. Heading is only as good as the gyroscope.
 
-Calibration needs tilt to find the walking direction and fusion needs it for the result; both run this one
-filter, so the module knows nothing of calibration.
+Calibration needs tilt to find the walking direction and fusion needs it for the result; both use this filter,
+so the module is independent of calibration.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ import numpy as np
 
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.rotation import compiled, find_middle
 from sagittal.core.signals.held_samples import SampleSeries, cut_blocks
 
@@ -34,8 +34,8 @@ class AttitudeParams:
     ----------
     kp : 1/s; a tilt error decays with time constant 1/kp. 0.1 is untuned
         (docs/science/orientation.md, "Parameters").
-    relearn_s : shortest invalid stretch after which the tilt is learnt anew; up to 0.1 s are interpolated
-        upstream (docs/science/timeline.md, "Rule") and never seen here.
+    relearn_s : shortest gap after which the tilt is estimated again; up to 0.1 s are interpolated upstream
+        (docs/science/timeline.md, "Rule") and do not occur here.
     """
 
     kp: float = 0.1
@@ -43,17 +43,19 @@ class AttitudeParams:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.kp <= 10.0:
-            raise ParameterError("gain_out_of_range", f"kp = {self.kp:g} 1/s is outside 0 to 10.")
+            raise ParameterError(
+                "gain_out_of_range", Message("kp = {kp:g} 1/s is outside 0 to 10.", kp=self.kp)
+            )
 
 
 @dataclass(frozen=True, eq=False)
 class AttitudeState:
-    """What the filter carries from one sample to the next.
+    """Filter state carried from one sample to the next.
 
     Parameters
     ----------
     q : (4,) sensor to world. rate : (3,) rad/s of the last sample. age_s : time since the tilt was lost, inf
-    when it is known. lost_s : length of the invalid stretch that is going on.
+        if known. lost_s : length of the current gap.
     """
 
     q: Floats
@@ -141,12 +143,12 @@ def advance(
 
     Returns
     -------
-    q (n, 4) sensor to world after each sample, and the state to go on with. One run over n samples equals any
-    split of it into blocks, bit for bit.
+    q (n, 4) sensor to world after each sample, and the final state. Results are bit-identical for any
+    division into blocks.
 
     Raises
     ------
-    EstimationError `filter_diverged` when a valid sample is not finite.
+    EstimationError `filter_diverged` if a valid sample is not finite.
     """
     gyr, acc = np.ascontiguousarray(gyr, np.float64), np.ascontiguousarray(acc, np.float64)
     x = np.array([*state.q, *state.rate, state.age_s, state.lost_s], np.float64)
@@ -164,7 +166,7 @@ def advance(
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """The filter over parts of a take, either way; as the parameters of `estimate_orientation`."""
+    """The filter over parts of a recording, in both directions; parameters as in `estimate_orientation`."""
 
     gyr: SampleSeries
     acc: SampleSeries
@@ -176,7 +178,9 @@ class _Runs:
     def run(
         self, q0: Floats, first: int, last: int, age_s: float = np.inf, out: Floats | None = None
     ) -> Floats:
-        """Orientation at sample `last` from that at `first`; all from the lower to the higher into `out`."""
+        """Orientation at sample `last` from that at `first`; all in between, in ascending order, written
+        to `out`.
+        """
         step, low = (1, first) if last >= first else (-1, last)
         state = AttitudeState(q0, step * self.gyr[first : first + 1][0], age_s)
         if out is not None:
@@ -194,7 +198,7 @@ class _Runs:
         return state.q
 
     def smooth(self, into: Floats, q0: Floats, start: int, a: int, b: int, age_s: float = np.inf) -> None:
-        """Write orientations of the samples a to b, both included, from q0 at one of them."""
+        """Write smoothed orientations of the samples a to b, inclusive, from q0 at one of them."""
         at_end = start == b and start != a
         first = self.run(q0, b, a, age_s) if at_end else self.run(self.run(q0, start, b, age_s), b, a)
         last = self.run(first, a, b, out=into)
@@ -214,18 +218,18 @@ def estimate_orientation(
     rest_norm: float,
     params: AttitudeParams,
 ) -> Floats:
-    """Orientation (n, 4) of a whole take from a known orientation at sample `at`, without phase lag.
+    """Orientation (n, 4) of a whole recording from a known orientation at sample `at`, without phase lag.
 
     The filter runs to the end, back to the start and forward again; the result is halfway between the last
-    backward and the last forward run. Backwards the rates are negated and the order reversed, which with the
-    mean of two samples as rate is exactly the inverse motion: the two runs differ only in what the
-    accelerometer corrected, and its lag cancels. A stretch behind a gap starts from where the gap began,
-    learns its tilt by the first run, and keeps an unknown heading (core/fusion/drift.py). Inside a gap the
+    backward and the last forward run. Backward the rates are negated and the order reversed, which with the
+    mean of two samples as rate is exactly the inverse motion: the two runs differ only in the corrections by
+    the accelerometer, and its lag cancels. After a gap the filter starts with the orientation from before it,
+    estimates its tilt in the first run, and has an unknown heading (core/fusion/drift.py). Inside a gap the
     orientation is held.
 
     Parameters
     ----------
-    gyr, acc : (n, 3) as in `advance`, asked for in blocks.
+    gyr, acc : (n, 3) as in `advance`, accessed in blocks.
     """
     runs = _Runs(gyr, acc, valid, rate_hz, rest_norm, params)
     out = np.empty((len(valid), 4))
@@ -247,7 +251,7 @@ def estimate_orientation(
 
 
 def _stretches(valid: Bools, bridge: int) -> list[tuple[int, int]]:
-    """First and last index of the valid stretches; gaps of up to `bridge` samples do not part them."""
+    """First and last index of the valid stretches; gaps of up to `bridge` samples do not separate them."""
     index = np.flatnonzero(valid)
     if not len(index):
         return []
@@ -258,7 +262,7 @@ def _stretches(valid: Bools, bridge: int) -> list[tuple[int, int]]:
 
 
 def compile_attitude_kernel() -> None:
-    """Compile or load the kernel, so that the first recording does not wait for it."""
+    """Compile the kernel or load it from the cache, so that the first recording is not delayed."""
     state = AttitudeState(np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3))
     up = np.tile([0.0, 0.0, 9.81], (2, 1))
     advance(state, np.zeros((2, 3)), up, np.ones(2, bool), 100.0, 9.81, AttitudeParams())

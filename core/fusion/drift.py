@@ -1,11 +1,11 @@
-"""Relative heading over long walks: what six axes cannot see, held by what a walking body does on average.
+"""Relative heading in long walks: unobservable with six axes, stabilised by average properties of walking.
 
-Each gyroscope drifts about the vertical on its own (0.003 °/s/√s of bias walk make 9° in 5 min), and between
-two segments this shows as rotation and adduction, later as flexion. Nothing in six axes observes it. But
-while somebody walks straight, the heading of a segment relative to the pelvis, averaged over strides, stays
-what it was in the first straight walking next to standing. So the slow change of the stride-averaged relative
-heading is taken out. The price, told in the notice: a true slow change of the mean transverse posture is
-taken out with it. Short walks are left alone (docs/science/orientation.md, "Relative drift").
+Each gyroscope drifts about the vertical independently (a bias walk of 0.003 °/s/√s causes 9° in 5 min), which
+appears between two segments as rotation and adduction, later as flexion. Six axes cannot observe it. But in
+straight walking the heading of a segment relative to the pelvis, averaged over strides, remains that of the
+first straight walking next to standing. Therefore slow changes of the stride-averaged relative heading are
+removed. The price, stated in the notice: a true slow change of the mean transverse posture is removed as
+well. Short walks are not corrected (docs/science/orientation.md, "Relative drift").
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, multiply, yaw
 from sagittal.core.signals.calibrated import Calibration
 from sagittal.core.signals.held_samples import cut_blocks
@@ -36,10 +37,12 @@ class DriftParams:
 
     Parameters
     ----------
-    reference_s : straight walking next to standing that defines the mean relative heading; walks with no more
-        straight walking than this are left alone. smooth_s : standard deviation of the Gaussian over which
-        the relative heading is averaged: 4 s hold at least 6 strides of 1.5 s at half weight or more.
-    least_s : straight walking within reach below which the correction is held. tell : drift that is told.
+    reference_s : duration of straight walking next to standing that defines the mean relative heading; walks
+        with no more straight walking than this are not corrected. smooth_s : standard deviation of the
+        Gaussian that averages the relative heading: 4 s include at least 6 strides of 1.5 s with at least
+        half weight.
+    least_s : minimum straight walking within reach; with less the correction is held. tell : reporting
+        threshold.
     """
 
     reference_s: float = 30.0
@@ -55,12 +58,13 @@ def remove_relative_drift(
     rate_hz: float,
     params: DriftParams,
 ) -> tuple[dict[Segment, Floats], dict[str, float], list[Notice]]:
-    """Turn each segment about the vertical so that its stride-averaged heading to the reference stays.
+    """Rotate each segment about the vertical to keep its stride-averaged heading relative to the reference
+    constant.
 
     Parameters
     ----------
-    q : segment → (n, 4) in W. The reference is the pelvis; without it, or where it was lost in between,
-        the mean of the segments that never were.
+    q : segment → (n, 4) in W. The reference is the pelvis; without it, or if it was lost in between, the mean
+        of the segments without data loss.
 
     Returns
     -------
@@ -94,10 +98,13 @@ def remove_relative_drift(
     if largest and max(largest.values()) > params.tell:
         # two sensors turn apart by the same angle: the first is told of, whatever the last digits are
         worst = max(largest, key=lambda s: round(largest[s], ALIKE_DIGITS))
-        message = (
-            f"The heading of {worst} drifted by up to {degrees(largest[worst]):.0f}° against the reference "
-            "and was brought back to its mean over straight walking. Slow changes of rotation posture during "
-            "the take are taken out with it: read transverse angles as changes within a stride."
+        message = Message(
+            "The heading of {worst} drifted by up to {degrees:.0f}° against the reference and "
+            "was brought back to its mean over straight walking. Slow changes of rotation "
+            "posture during the take are taken out with it: read transverse angles as changes "
+            "within a stride.",
+            worst=worst,
+            degrees=degrees(largest[worst]),
         )
         notices.append(Notice("heading_rereferenced", message, sensor=worst, severity="info"))
     return corrected, largest, notices
@@ -119,7 +126,7 @@ def _drift(
     rate_hz: float,
     params: DriftParams,
 ) -> Floats:
-    """Drift (n,) in rad of one segment's relative heading (n,) complex, zero around standing."""
+    """Drift (n,) in rad of one segment's complex relative heading (n,), zero around standing."""
     zero = index_window(calibration.zero, rate_hz)
     middle = (zero.start + zero.stop) // 2
     turn = np.zeros(len(straight))

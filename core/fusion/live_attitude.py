@@ -1,4 +1,4 @@
-"""Orientation of single sensors as samples come: the filter of core/fusion/attitude.py, forward only."""
+"""Orientation of single sensors in real time: the filter of core/fusion/attitude.py, forward only."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagittal.core.signals.calibrated import SegmentCalibration
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _settle(state, force):  # type: ignore[no-untyped-def]
-    """Turn a filter's orientation by the shortest way so that this mean force (3,) in W points up."""
+    """Rotate a filter's orientation by the shortest rotation so that this mean force (3,) in W points up."""
     x, y, z = force[0], force[1], force[2]
     sine, length = np.sqrt(x * x + y * y), np.sqrt(x * x + y * y + z * z)
     half = 0.5 * np.arctan2(sine, z)
@@ -36,7 +36,7 @@ def _turn(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     still, look : (T, feet). state : (f, 9), doubt : (feet,), rest : (feet, 3) advanced in place: s since the
-        orientation was lost, −1 = it is known; sum of the force in W over the rest.
+        orientation was lost, −1 = known; sum of the force in W over the rest.
     out : (T, f, 4) written, segment to W. known : (T, f) written.
     """
     T = acc.shape[0]
@@ -95,15 +95,17 @@ def _turn(  # type: ignore[no-untyped-def]
 
 
 class AttitudeTracker:
-    """Tilt and turn of some sensors by themselves, from standing on; blocks do not matter.
+    """Attitude of single sensors, starting from standing; independent of the division into blocks.
 
-    A loss while a foot swings leaves its pitch wrong by a right angle and more, and the filter alone takes
-    ten seconds to forget it. So a foot's orientation is unknown from a loss until gravity in its next rest
-    says how it is tilted, or those ten seconds are over; and it begins anew at any rest that contradicts it.
+    A data loss during swing causes a pitch error of a right angle or more, which the filter alone takes ten
+    seconds to correct. Therefore the orientation of a foot is unknown after a loss until gravity in its next
+    rest determines the tilt, or those ten seconds have passed; and it is reinitialised at any rest that
+    contradicts it.
 
     Parameters
     ----------
-    which : of the chain's sensors. mounted : how these sit. feet : so many of them, the first, are feet.
+    which : indices of the chain's sensors. mounted : their alignment. feet : number of feet, which come
+        first.
     """
 
     def __init__(
@@ -127,11 +129,11 @@ class AttitudeTracker:
         self._doubt, self._rest = np.full(feet, -1.0), np.zeros((feet, 3))
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools, still: Bools) -> tuple[Floats, Bools]:
-        """Segments to W (T, f, 4), and where these are known (T, f).
+        """Segments to W (T, f, 4), and their validity (T, f).
 
         Parameters
         ----------
-        acc, gyr : (T, n, 3) as measured. valid : (T, n). still : (T, feet) the foot stands.
+        acc, gyr : (T, n, 3) as measured. valid : (T, n). still : (T, feet) the foot is at rest.
         """
         out = np.empty((len(acc), len(self._which), 4))
         known = np.empty(out.shape[:2], np.bool_)

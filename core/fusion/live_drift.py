@@ -1,10 +1,8 @@
-"""Relative heading in a long session, where no joints hold it: core/fusion/drift.py with what came before
-only.
+"""Relative heading in long live sessions without linked joints: a causal version of core/fusion/drift.py.
 
-Each gyroscope drifts about the vertical on its own: two feet and a pelvis come apart by 13° in five simulated
-minutes. While somebody walks straight, the heading of a segment relative to the pelvis, averaged over
-strides, stays what it was in the first straight walking. What its mean over the last seconds is off by is
-taken out.
+Each gyroscope drifts about the vertical independently: two feet and a pelvis diverge by 13° in five simulated
+minutes. In straight walking the heading of a segment relative to the pelvis, averaged over strides, remains
+that of the first straight walking. The deviation of its mean over the last seconds is removed.
 """
 
 from __future__ import annotations
@@ -38,14 +36,14 @@ QUICK_S: Final = 1.0
 def _hold(  # type: ignore[no-untyped-def]
     q, gyr, valid, lead, dt, moving, scalars, first, mean, seen, turn, ahead, quiet
 ):
-    """Turn segments q (T, n, 4) about the vertical in place.
+    """Rotate segments q (T, n, 4) about the vertical in place.
 
     Parameters
     ----------
     gyr : (T, n, 3) of their sensors. lead : index of the reference, −1 = the mean of all. moving : rad/s.
-    scalars : samples of the reference and least after a gap; mean_s, quick_s, rad of a turn. first, mean :
-    (n, 2) sum of the reference, running mean. seen : (n, 2) samples in both. turn : (n,) rad. ahead : (2,)
-    slow heading. quiet : (1,) samples since somebody moved.
+    scalars : samples of the reference and minimum after a gap; mean_s, quick_s, rad of a turn. first, mean :
+        (n, 2) sum of the reference, running mean. seen : (n, 2) samples in both. turn : (n,) rad. ahead :
+        (2,) slow heading. quiet : (1,) samples since the last movement.
     """
     n = q.shape[1]
     heading = np.empty((n, 2))
@@ -106,12 +104,12 @@ def _hold(  # type: ignore[no-untyped-def]
 
 
 class HeadingHold:
-    """The correction of some segments; any division into blocks gives the same bits.
+    """The correction of some segments; results are bit-identical for any division into blocks.
 
     Parameters
     ----------
-    segments : one of them alone is left as it is; the pelvis leads where it is among them.
-    moving_rps : angular rate of a sensor, rad/s, from which on somebody moves.
+    segments : a single one is not corrected; the pelvis is the reference if included.
+    moving_rps : angular rate of a sensor above which the person moves, rad/s.
     """
 
     def __init__(self, segments: Sequence[Segment], rate_hz: float, moving_rps: float) -> None:
@@ -126,7 +124,7 @@ class HeadingHold:
         self._ahead, self._quiet = np.array([1.0, 0.0]), np.array([1 << 30], np.int64)
 
     def push(self, q: Floats, gyr: Floats, valid: Bools) -> None:
-        """Turn segments q (T, n, 4) to W in place; gyr (T, n, 3), valid (T, n) of their sensors."""
+        """Rotate segments q (T, n, 4) to W in place; gyr (T, n, 3), valid (T, n) of their sensors."""
         if q.shape[1] > 1:
             _hold(
                 q, gyr, valid, self._lead, self._dt, self._moving, self._scalars, self._first,

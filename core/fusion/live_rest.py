@@ -1,4 +1,4 @@
-"""Where a foot has rested for long enough to be asked whether its orientation is right: gravity says so."""
+"""Detection of rests of a foot that are long enough to check its orientation against gravity."""
 
 from __future__ import annotations
 
@@ -21,11 +21,13 @@ of simulated people have at most 1.5°, neura_walk 1.6°."""
 
 
 class RestLooks:
-    """Samples `RESTED_S` into a rest of each of n feet, one of every rest; blocks do not matter."""
+    """Samples `RESTED_S` into a rest of each of n feet, one per rest; independent of the division into
+    blocks.
+    """
 
     def __init__(self, n: int, rate_hz: float) -> None:
         self._rested, self._look = np.zeros(n, np.int64), max(1, round(RESTED_S * rate_hz))
 
     def push(self, still: Bools) -> Bools:
-        """Where to look (T, n), of feet that rest (T, n)."""
+        """Check samples (T, n), from the rest of feet (T, n)."""
         return np.asarray(count_runs(still, self._rested) == self._look)

@@ -1,8 +1,9 @@
-"""The default engine: Mahony 2008, six axes, gyro bias frozen from rest, started from standing.
+"""The default engine: Mahony 2008, six axes, gyro bias fixed from rest, started from standing.
 
-At standing every segment faces forward by convention, so the calibration itself is the start: the sensor's
-orientation in W at rest is R_neutral R_segment_sensor. From there the filter of attitude.py runs to both
-ends of the take. What remains is the turn about the vertical that no accelerometer sees; drift.py treats it.
+In standing every segment faces forward by convention, so the calibration itself gives the initial state: the
+sensor's orientation in W at rest is R_neutral R_segment_sensor. From there the filter of attitude.py runs to
+both ends of the recording. The remaining error is rotation about the vertical, which accelerometers cannot
+observe; drift.py handles it.
 """
 
 from __future__ import annotations
@@ -40,12 +41,12 @@ def estimate_orientations(
 
     Returns
     -------
-    Orientations with `valid` False where a sensor was lost; a notice `heading_rereferenced` tells how
-    much relative heading drift was taken out.
+    Orientations with `valid` False where a sensor was lost; a notice `heading_rereferenced` with the amount
+    of relative heading drift removed.
 
     Raises
     ------
-    EstimationError `no_segment` when calibration found no segment, `filter_diverged` on non-finite samples.
+    EstimationError `no_segment` without a calibrated segment, `filter_diverged` on non-finite samples.
     """
     params = params or MahonyParams()
     recording, calibration = calibrated.recording, calibrated.calibration
@@ -74,7 +75,7 @@ def estimate_orientations(
 def segment_orientation(
     signals: SensorSignals, mounted: SegmentCalibration, zero: Window, rate_hz: float, params: AttitudeParams
 ) -> Floats:
-    """Orientation (n, 4) of one segment in W, from `zero` to both ends of the take."""
+    """Orientation (n, 4) of one segment in W, from `zero` to both ends of the recording."""
     start = mounted.start_q
     if start is None:
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)

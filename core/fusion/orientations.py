@@ -1,4 +1,4 @@
-"""What fusion gives: the orientation of every segment in the common world W."""
+"""Result of fusion: the orientation of every segment in the common world W."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from sagittal.core.frames import Bools, Floats, Segment
 
 
 class LastReading(dict[Segment, Floats]):
-    """Orientations (n, 4) by segment in the hands of their last reader, who lets go of what it has read."""
+    """Orientations (n, 4) by segment for a final reader, which releases them after use."""
 
     def forget(self, segments: Iterable[Segment]) -> None:
-        """Nothing of these any more; they keep their places in the order."""
+        """Release these orientations; the segments keep their positions in the order."""
         self.update(dict.fromkeys(segments, np.empty((0, 4))))
 
 

@@ -1,4 +1,4 @@
-"""The 42 healthy adults of the WBDS strides as a reference for scores."""
+"""The 42 healthy adults of the WBDS as a reference for scores."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _KEYS: Final = {
 def adult_reference() -> CurveReference:
     """Reference of GVS, GPS, gps_sagittal and GDI*: comfortable overground walking, anatomical angles.
 
-    One group for every age: the spread of the scores is that of all 42 against each other, and speed changes
-    the curves more than age does (docs/science/norms-and-scores.md, "Speed").
+    One group for every age: the spread of the scores is that among all 42 people, and speed changes the
+    curves more than age does (docs/science/norms-and-scores.md, "Speed").
     """
     bands = adult_kinematics(None).bands
     return CurveReference(
@@ -38,7 +38,9 @@ def adult_reference() -> CurveReference:
 
 
 def adult_reference_at_speed(age: float | None, speed: WalkingSpeed | None) -> CurveReference | None:
-    """Reference of healthy adults asked to walk at this speed; None where nobody was, or none below 18."""
+    """Reference of healthy adults walking at this instructed speed; None outside their range of speeds, or
+    below 18 years.
+    """
     if speed is None or not is_matched(speed.norm_speed) or wbds_group(age) is None:
         return None
     return reference_at_speed(age, speed.norm_speed, adult_reference())

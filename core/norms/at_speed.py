@@ -1,9 +1,10 @@
-"""Norms at a person's own speed: healthy adults asked to walk as slowly as this.
+"""Norms at a person's own speed: healthy adults instructed to walk equally slowly.
 
-docs/science/norms-and-scores.md, "At the person's speed". The effect of speed is that of 52 adults who
-walked overground at five speeds (Schreiber & Moissenet 2019); the level is that of the WBDS adults at their
-comfortable speed, so that the two norms meet at 1.25 m/s. Curves and figures are models of their own: slow
-walking smears the moment of a peak, and the peak of the mean curve is up to 11° below the mean of the peaks.
+docs/science/norms-and-scores.md, "At the person's speed". The effect of speed is that of 52 adults who walked
+overground at five speeds (Schreiber & Moissenet 2019); the level is that of the WBDS adults at their
+comfortable speed, so that the two norms coincide at 1.25 m/s. Curves and discrete parameters have separate
+models: in slow walking the timing of a peak varies, and the peak of the mean curve is up to 11° below the
+mean of the peaks.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class CurveModel:
         return np.asarray(self.coefficients @ _terms(v))
 
     def relative_sd(self, v: float) -> Floats:
-        """Standard deviation (101,) over that at 1.25 m/s; linear between the speeds of the table."""
+        """Standard deviation (101,) relative to that at 1.25 m/s; linear between the speeds of the table."""
         above = int(np.clip(np.searchsorted(self.speeds, v), 1, len(self.speeds) - 1))
         low, high = self.speeds[above - 1 : above + 1]
         share = float(np.clip((v - low) / (high - low), 0.0, 1.0))
@@ -96,7 +97,7 @@ def curve_models() -> Mapping[str, CurveModel]:
 
 
 def move_curve(curve: Floats, model: CurveModel, v: float, comfortable: float = COMFORTABLE) -> Floats:
-    """A mean curve (101,) of people at a comfortable v* as they would walk at v*, 0.085 to 0.439."""
+    """Predict a mean curve (101,) at v*, 0.085 to 0.439, from that at a comfortable v*."""
     offset = curve - model.mean(comfortable)
     level = offset.mean()
     share = float(np.clip((v - BLEND[0]) / BLEND[1], 0.0, 1.0))
@@ -104,7 +105,7 @@ def move_curve(curve: Floats, model: CurveModel, v: float, comfortable: float = 
 
 
 def bands_at_speed(age: float | None, v: float) -> Mapping[str, NormBand]:
-    """Reference bands at a dimensionless speed, by variable; of nobody below 18 years.
+    """Reference bands at a dimensionless speed, by variable; none below 18 years.
 
     Parameters
     ----------
@@ -154,10 +155,10 @@ _LAST_BIN: Final = "loso_sd_v36_55"
 def angle_values_at_speed(
     age: float | None, v: float, anatomical: Collection[str] = ()
 ) -> Mapping[str, NormValue]:
-    """Reference of the angle figures at a dimensionless speed; as `angle_values` in all else.
+    """Reference of the angle parameters at a dimensionless speed; otherwise as `angle_values`.
 
-    A figure of knee and ankle is the mean of the individual figures: the comfortable one of the person's age
-    group plus the change by speed; sd is what a person left out departs from it.
+    For knee and ankle a reference is the mean of individual parameters: the comfortable value of the person's
+    age group plus the change with speed; sd is that of leave-one-out deviations.
     """
     usual = angle_values(age, anatomical).values
     rows = {r["parameter"]: r for r in read_rows("discrete_model_rehazenter52")}
@@ -206,25 +207,27 @@ def _window(figure: CurveFigure) -> slice:
 
 
 def _read(figure: CurveFigure, bands: Mapping[str, NormBand]) -> float:
-    """A figure of the mean curve, degrees."""
+    """A discrete parameter of the mean curve, degrees."""
     return float(_STATISTICS[figure.statistic](bands[figure.variable].mean_deg[_window(figure)]))
 
 
 def _growth(figure: CurveFigure, bands: Mapping[str, NormBand], usual: Mapping[str, NormBand]) -> float:
-    """How much more people differ at this speed than at their comfortable one, where a figure is read."""
+    """Ratio of the spread at this speed to that at comfortable speed, at the point where a parameter is
+    read.
+    """
     now, then = (of[figure.variable].sd_deg[_window(figure)] for of in (bands, usual))
     return float(np.sqrt(np.mean(now**2) / np.mean(then**2)))
 
 
 def walkway_values_at_speed(v: float, leg_m: float) -> Mapping[str, NormValue]:
-    """Times and distances of healthy adults overground at a dimensionless speed.
+    """Spatiotemporal references of healthy adults overground at a dimensionless speed.
 
     Parameters
     ----------
-    leg_m : `WalkingSpeed.norm_leg_m`, which made the speed dimensionless.
+    leg_m : `WalkingSpeed.norm_leg_m`, used to make the speed dimensionless.
 
-    Swing and double support follow from stance for people whose legs do alike: double = 2 stance − 100,
-    single = swing = 100 − stance. Step time is 60 / cadence; a stride is two steps.
+    Swing and double support follow from stance for symmetric gait: double = 2 stance − 100, single = swing =
+    100 − stance. Step time is 60 / cadence; a stride is two steps.
     """
     stance, stance_sd = _spatiotemporal("stance", v)
     initial, initial_sd = _spatiotemporal("ds1", v)
@@ -258,12 +261,12 @@ _SHARE_OF: Final = dict.fromkeys(
 
 
 def reference_at_speed(age: float | None, v: float, comfortable: CurveReference) -> CurveReference:
-    """What curves are scored against at a dimensionless speed.
+    """Reference for scoring curves at a dimensionless speed.
 
     Healthy people differ more from each other at slow speed. A score is the root of a mean of squared
-    deviations, so its spread grows with theirs: of a variable by the RMS of the relative sd over the cycle,
-    of a profile by those of its variables, weighted by the squares of their healthy scores. The people's
-    ln GPS keep their width.
+    deviations, so its spread increases with theirs: for a variable by the RMS of the relative sd over the
+    cycle, for a profile by those of its variables, weighted by the squares of their healthy scores. The
+    spread of ln GPS is unchanged.
     """
     bands, models = bands_at_speed(age, v), curve_models()
     usual = adult_kinematics(age).bands
@@ -331,5 +334,7 @@ def _spatiotemporal(parameter: str, v: float) -> tuple[float, float]:
 
 
 def is_matched(v: float) -> bool:
-    """Healthy adults were asked to walk at this dimensionless speed, below their comfortable one."""
+    """Whether the reference includes healthy adults instructed to walk at this dimensionless speed, below
+    comfortable.
+    """
     return SLOWEST <= v < COMFORTABLE

@@ -1,8 +1,8 @@
 """A clinic's own control group: references from sessions of healthy people, measured with the same sensors.
 
-They need no excuse for another zero, foot-off or width: what is compared was measured alike. Whose sessions
-may be used (consent, health) is decided before; here is only arithmetic. One person counts once, however many
-sessions there are.
+No corrections for different zero, foot-off definition or spread are necessary, since the measurement is the
+same. The selection of permitted sessions (consent, health) happens earlier; this module is only arithmetic.
+Each person counts once, however many sessions there are.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.kinematics import NormBand
 from sagittal.core.norms.lookup import Norms
 from sagittal.core.norms.profile import SAGITTAL, CurveReference, MeanCurves, gather_curves, leave_one_out
@@ -42,7 +43,7 @@ class ControlSession:
     Parameters
     ----------
     person : code of the person, equal in all their sessions.
-    parameters : of the session. curves : mean curves of the counted strides, degrees from standing.
+    parameters : of the session. curves : mean curves of the counted strides, degrees relative to standing.
     """
 
     person: str
@@ -59,14 +60,13 @@ class ControlSession:
 
 @dataclass(frozen=True, eq=False)
 class ControlGroup:
-    """References made from a clinic's own controls.
+    """References derived from a clinic's own controls.
 
     Parameters
     ----------
-    n : people. group, source : printed beside every figure.
-    values, bands : as those of the shipped tables. reference : for scores; None without joint angles.
-    reason : "few_controls" below five people, then there is nothing else; None otherwise.
-    note : "small_group" below twenty.
+    n : people. group, source : printed with every value. values, bands : as for the shipped tables.
+        reference : for scores; None without joint angles. reason : "few_controls" below five people, without
+        any reference; None otherwise. note : "small_group" below twenty.
     """
 
     n: int
@@ -79,7 +79,7 @@ class ControlGroup:
     note: str | None = None
 
     def norms(self, speed_mps: float | None = None, height_m: float | None = None) -> Norms:
-        """The group as the reference of a person."""
+        """The group as the reference for a person."""
         speed = None if speed_mps is None else walking_speed(speed_mps, height_m)
         return Norms(
             speed,
@@ -98,12 +98,12 @@ def control_group(
     sex: Sex | None = None,
     speed_mps: Range | None = None,
 ) -> ControlGroup:
-    """Make references from the sessions that fit; a session whose age, sex or speed is asked and not known
-    does not.
+    """Derive references from the matching sessions; a session with unknown age, sex or speed does not match
+    if that is a criterion.
 
     Parameters
     ----------
-    age, speed_mps : smallest and largest, both included. sex : None = both.
+    age, speed_mps : minimum and maximum, inclusive. sex : None = both.
     """
     people: dict[str, list[ControlSession]] = {}
     for s in sessions:
@@ -120,7 +120,9 @@ def control_group(
         )
         if part
     )
-    source = f"{n} {plural(n, 'control', 'controls')} of this clinic, same sensors and method"
+    source = Message(
+        f"{{value}} {plural(n, 'control', 'controls')} of this clinic, same sensors and method", value=n
+    )
     if n < FEWEST:
         return ControlGroup(n, who, source, reason="few_controls")
     values = [_mean_values(s) for s in people.values()]
@@ -141,13 +143,14 @@ def control_group(
 
 
 def mean_curves(curves: CycleCurves, estimated: Collection[str] = ()) -> MeanCurves:
-    """Mean curves of the counted strides in degrees, as a control session keeps them; none of too few.
+    """Mean curves of the counted strides in degrees, as stored in a control session; none with too few
+    strides.
 
-    Of somebody who never stood still the curves have no level, and there are none.
+    Without quiet standing curves have no absolute level, and none are returned.
 
     Parameters
     ----------
-    estimated : variables that no two sensors measure: nobody's reference.
+    estimated : variables not measured by two sensors, which cannot serve as a reference.
     """
     found: dict[Side, dict[str, Floats]] = {}
     if curves.zero != "standing":
@@ -165,7 +168,7 @@ def _within(value: float | None, limits: Range | None) -> bool:
 
 
 def _mean_values(sessions: Sequence[ControlSession]) -> Values:
-    """A person's mean of every measured parameter over their sessions, of those with enough strides."""
+    """A person's mean of every measured parameter over all sessions with enough strides."""
     found: dict[tuple[str, Side | None], list[float]] = {}
     for s in sessions:
         for p in s.parameters:

@@ -1,11 +1,11 @@
-"""What healthy people need for a timed test, by age; only figures of which the source was read.
+"""References of timed tests in healthy people, by age; only values whose source has been read.
 
 Timed up and go: Bohannon 2006, J Geriatr Phys Ther 29:64, doi:10.1519/00139143-200608000-00004, mean and
 upper end of its 95 % confidence interval. Five times sit to stand: Bohannon 2006, Percept Mot Skills 103:215,
-doi:10.2466/pms.103.1.215-222, the time beyond which a person is worse than average (13 papers). Comfortable
+doi:10.2466/pms.103.1.215-222, the time above which performance is worse than average (13 papers). Comfortable
 speed: Bohannon and Andrews 2011, Physiotherapy 97:182, doi:10.1016/j.physio.2010.12.004, means of 41 papers.
 Six minutes: Cazzoletti et al. 2022, Respir Res 23:83, doi:10.1186/s12931-022-02003-y, means and standard
-deviations of 287 women and 243 men of the general population who were healthy.
+deviations of 287 healthy women and 243 healthy men of the general population.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ class TimedTestNorm:
 
     Parameters
     ----------
-    ages : first and last year it holds for. mean_s : of healthy people, None where only a limit is known.
-    limit_s : above it a person is slower than average. source : as printed.
+    ages : first and last year of validity. mean_s : of healthy people, None if only a limit is known.
+        limit_s : slower than average above it. source : as printed.
     """
 
     ages: tuple[int, int]
@@ -49,7 +49,7 @@ TEST_NORMS: Final[dict[str, tuple[TimedTestNorm, ...]]] = {
 
 
 def find_test_norm(name: str, age: float | None) -> TimedTestNorm | None:
-    """The reference of a total time at an age; None where there is none or the age is not known."""
+    """The reference of a total time at an age; None without one or for an unknown age."""
     if age is None:
         return None
     return next((n for n in TEST_NORMS.get(name, ()) if n.ages[0] <= age < n.ages[1] + 1), None)
@@ -57,7 +57,7 @@ def find_test_norm(name: str, age: float | None) -> TimedTestNorm | None:
 
 @dataclass(frozen=True)
 class ComfortableSpeedNorm:
-    """Mean speed in m/s of healthy people of one sex who walk as they like, with the ages it holds for."""
+    """Mean comfortable speed in m/s of healthy people of one sex, with its age range."""
 
     ages: tuple[int, int]
     mean_mps: float
@@ -75,14 +75,14 @@ COMFORTABLE_SPEEDS: Final[dict[str, tuple[float, ...]]] = {
 
 
 def find_comfortable_speed(age: float, sex: str) -> ComfortableSpeedNorm | None:
-    """The reference of the ten-metre walk at an age; None where there is none."""
+    """The reference of the ten-metre walk at an age; None without one."""
     rows = zip(_DECADES, COMFORTABLE_SPEEDS.get(sex, ()), strict=False)
     return next((ComfortableSpeedNorm(a, v) for a, v in rows if a[0] <= age < a[1] + 1), None)
 
 
 @dataclass(frozen=True)
 class SixMinuteNorm:
-    """How far healthy people of one sex walk in six minutes, and the ages of those who were measured."""
+    """Six-minute distance of healthy people of one sex, and their age range."""
 
     ages: tuple[int, int]
     mean_m: float
@@ -99,6 +99,6 @@ SIX_MINUTE_NORMS: Final[dict[str, SixMinuteNorm]] = {
 
 
 def find_six_minute_norm(age: float, sex: str) -> SixMinuteNorm | None:
-    """The reference of the six-minute walk; None where nobody of that age or sex was measured."""
+    """The reference of the six-minute walk; None without measurements for that age or sex."""
     norm = SIX_MINUTE_NORMS.get(sex)
     return norm if norm is not None and norm.ages[0] <= age < norm.ages[1] + 1 else None

@@ -1,8 +1,8 @@
 """Reference curves of healthy adults over the gait cycle (docs/science/norms-and-scores.md).
 
-The reference angles are anatomical, ours are zero at the person's own standing. A band may stand behind a
-curve only where both are measured from the same zero, so every band says its own; curves of a person whose
-standing was read with a goniometer have that of the reference (`sagittal.core.parameters.anatomical_zero`).
+The reference angles are anatomical, ours are relative to the person's own standing. A band may be drawn with
+a curve only if both have the same zero, so every band includes its zero; curves of a person with goniometer
+angles in standing have that of the reference (`sagittal.core.parameters.anatomical_zero`).
 """
 
 from __future__ import annotations
@@ -45,9 +45,8 @@ class NormBand:
     ----------
     variable : as in CycleCurves, e.g. "knee_flexion".
     mean_deg, sd_deg : (101,) mean, and standard deviation of a single side between people.
-    n : people. group, source : who and from where; both are printed.
-    zero : what its angles are measured from; it may stand behind curves with the same zero only.
-    confidence, note : what to print beside it.
+    n : people. group, source : population and origin; both are printed. zero : zero of its angles; it may be
+        drawn only with curves of the same zero. confidence, note : to be printed with it.
     """
 
     variable: str
@@ -63,7 +62,7 @@ class NormBand:
 
 @dataclass(frozen=True, eq=False)
 class NormBands:
-    """Bands by variable, or none and the reason: "no_norm_for_age"."""
+    """Bands by variable, or none with the reason "no_norm_for_age"."""
 
     bands: Mapping[str, NormBand] = field(default_factory=dict)
     reason: str | None = None

@@ -1,4 +1,6 @@
-"""One person → the reference that fits: by age, sex and dimensionless speed, or none and why."""
+"""Selection of the reference for a person: by age, sex and dimensionless speed, or the reason for having
+none.
+"""
 
 from __future__ import annotations
 
@@ -31,22 +33,24 @@ from sagittal.core.norms.values import (
 
 @dataclass(frozen=True, eq=False)
 class Norms:
-    """Everything a person is compared with.
+    """All references for a person.
 
     Parameters
     ----------
-    speed : None = not measured; then all adults at comfortable speed are the reference.
-    pace : class of the walkway norms that this speed falls into.
-    values : parameter → reference, each with n, group, source and whether it is comparable. Adults below
-        comfortable speed: of healthy adults asked to walk as slowly (`sagittal.core.norms.at_speed.ASKED`).
-    expected : step length and cadence expected at this very speed.
-    bands : variable → band over the cycle, each with its zero; at this speed as `values`.
-    comfortable, comfortable_bands : of people at their own comfortable speed, where the above are at this
-        one; empty where the above are of these people already.
-    reason : why no angle is compared: "no_norm_for_age", "no_speed_matched_norm" (slower or faster than the
-        reference people).
-    timing_reason : why no time or distance is compared: these, or "age_unknown", "sex_unknown". Gait speed
-        itself is held against the speed healthy people like, however slow the person.
+    speed : None = not measured; the reference is then all adults at comfortable speed.
+    pace : class of the walkway norms for this speed.
+    values : parameter → reference, each with n, group, source and whether it is comparable. For adults below
+        comfortable speed: of healthy adults instructed to walk equally slowly
+        (`sagittal.core.norms.at_speed.ASKED`).
+    expected : step length and cadence expected at exactly this speed.
+    bands : variable → band over the cycle, each with its zero; for this speed, as `values`.
+    comfortable, comfortable_bands : of people at their comfortable speed, if the above are for the person's
+        speed; empty if the above already are.
+    reason : why angles have no reference: "no_norm_for_age", "no_speed_matched_norm" (slower or faster than
+        the reference people).
+    timing_reason : why times and distances have no reference: these, or "age_unknown", "sex_unknown". Gait
+        speed itself is compared with the comfortable speed of healthy people, regardless of the person's
+        speed.
     """
 
     speed: WalkingSpeed | None
@@ -60,12 +64,12 @@ class Norms:
     timing_reason: str | None = None
 
     def place(self, name: str, value: float | None, uncertainty: float | None = None) -> NormPlacement:
-        """Where a value of a parameter, known ± `uncertainty`, stands."""
+        """Placement of a parameter value, known ± `uncertainty`, among the reference people."""
         reason = self.reason if is_angle(name) else self.timing_reason
         return place_value(value, self.values.get(name), reason or "no_norm", uncertainty)
 
     def place_difference(self, name: str, left: float | None, right: float | None) -> NormPlacement:
-        """Where left minus right stands among healthy differences."""
+        """Placement of left minus right among healthy differences."""
         return place_difference(left, right, self.values.get(name))
 
 
@@ -79,18 +83,19 @@ def look_up_norms(
     treadmill: bool = False,
     contacts_s: float | None = 0.0,
 ) -> Norms:
-    """Look up the reference of a person.
+    """Look up the references for a person.
 
     Parameters
     ----------
-    age : years; None = all adults, and nobody for times and distances. sex : None = nobody for these.
-    speed_mps : walking speed. height_m : makes it dimensionless.
-    anatomical : variables whose anatomical level is known on both sides
-        (`sagittal.core.parameters.anatomical_zero`); figures of the others compare in range only.
-    treadmill : steps on a belt are quicker and shorter than on the floor at the same speed; below comfortable
-        speed they are held against people on a belt.
-    contacts_s : what the contacts are known to (`GaitEvents.contact_uncertainty_s`), 0 = exact, None = not
-        known; shares of the stride compare only where it is small.
+    age : years; None = all adults, but no reference for times and distances. sex : None = no reference for
+        these.
+    speed_mps : walking speed. height_m : to make it dimensionless.
+    anatomical : variables with a known anatomical level on both sides
+        (`sagittal.core.parameters.anatomical_zero`); for all others only ranges are compared.
+    treadmill : steps on a belt are faster and shorter than overground at the same speed; below comfortable
+        speed they are compared with treadmill walking.
+    contacts_s : uncertainty of the contacts (`GaitEvents.contact_uncertainty_s`), 0 = exact, None = unknown;
+        phases as a percentage of the stride are compared only if it is small.
     """
     found = _look_up(age, sex, speed_mps, height_m, anatomical, treadmill=treadmill)
     return replace(found, values=withdraw_shares(found.values, contacts_s))
@@ -137,7 +142,7 @@ _EXPECTED: Final = ("step_length_m", "cadence_spm")
 
 
 def _is_too_fast(speed: WalkingSpeed | None, timing: Mapping[str, NormValue]) -> bool:
-    """Whether a person walks faster than the people of a walkway table that has no classes of pace."""
+    """Whether a person walks faster than the people of a walkway table without pace classes."""
     liked = timing.get("gait_speed_mps")
     if speed is None or liked is None or not liked.comparable:
         return False
@@ -147,7 +152,7 @@ def _is_too_fast(speed: WalkingSpeed | None, timing: Mapping[str, NormValue]) ->
 def _at_comfortable_speed(
     age: float | None, sex: Sex | None, speed: WalkingSpeed | None, anatomical: Collection[str]
 ) -> Norms:
-    """The reference of people at their comfortable speed, for those whose speed is within its range."""
+    """The reference of people at their comfortable speed, for speeds within its range."""
     slow = speed is not None and speed.is_slow
     fast = speed is not None and speed.is_fast
     bands = adult_kinematics(age)

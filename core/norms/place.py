@@ -1,4 +1,4 @@
-"""Where a value stands among reference people: z, percentile, grade."""
+"""Placement of a value among reference people: z-score, percentile, grade."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ Grade = Literal[0, 1, 2]
 
 @dataclass(frozen=True)
 class NormPlacement:
-    """A value among reference people, or why it has no place.
+    """Placement of a value among reference people, or the reason for having none.
 
     Parameters
     ----------
-    z : standard deviations above their mean. percentile : share in % of such people below the value, taken
-        as normally distributed.
-    grade : 0 within 1.5 sd, 1 within 4.5, 2 beyond; the least that value ± uncertainty leaves possible.
-    norm : the reference, also where it is not comparable.
-    reason : "no_value", "no_norm", "not_comparable" (`norm.note` says why), "no_spread", or the reason of a
-        lookup that found nobody.
+    z : standard deviations above their mean. percentile : percentage of such people below the value, assuming
+        a normal distribution.
+    grade : 0 within 1.5 sd, 1 within 4.5, 2 above; the lowest grade within value ± uncertainty.
+    norm : the reference, even if not comparable.
+    reason : "no_value", "no_norm", "not_comparable" (explained in `norm.note`), "no_spread", or the reason of
+        a lookup without result.
     """
 
     z: float | None
@@ -39,7 +39,7 @@ class NormPlacement:
 def place_value(
     value: float | None, norm: NormValue | None, reason: str = "no_norm", uncertainty: float | None = None
 ) -> NormPlacement:
-    """Place one value, known ± `uncertainty`; `reason` says why there is no norm, where that is known."""
+    """Place one value, known ± `uncertainty`; `reason` explains a missing norm, if known."""
     if norm is None:
         return NormPlacement(None, None, None, None, reason)
     if not norm.comparable:
@@ -50,9 +50,10 @@ def place_value(
 
 
 def place_difference(left: float | None, right: float | None, norm: NormValue | None) -> NormPlacement:
-    """Place left minus right among the left-right differences of healthy people, whose mean is taken as 0.
+    """Place left minus right among the left-right differences of healthy people, with an assumed mean of 0.
 
-    Needs no level: a norm that is not comparable in itself serves, if both sides have the same zero.
+    Independent of the absolute level: a norm that is not comparable itself can be used if both sides have the
+    same zero.
     """
     if norm is None or norm.difference_sd is None:
         return NormPlacement(None, None, None, norm, "no_norm")
@@ -62,15 +63,15 @@ def place_difference(left: float | None, right: float | None, norm: NormValue | 
 
 
 def percentile_of_z(z: float) -> float:
-    """Share in % of a normal population below z standard deviations."""
+    """Percentage of a normal population below z standard deviations."""
     return 50.0 * (1.0 + erf(z / sqrt(2.0)))
 
 
 def percentile_of_sample(z: float, n: int) -> float:
-    """Share in % below z sample standard deviations, given that mean and sd come from n people.
+    """Percentage below z sample standard deviations, for mean and sd from n people.
 
     Crawford & Howell 1998 (Clin Neuropsychol 12:482): t = z / √(1 + 1/n) with n − 1 degrees of freedom, so
-    that a few controls do not make an extreme percentile.
+    that a small control group does not produce extreme percentiles.
     """
     from scipy.special import stdtr
 

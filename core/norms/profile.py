@@ -2,8 +2,8 @@
 
 Baker et al. 2009 (Gait & Posture 30:265) and 2012: a GVS is the RMS over the cycle of one curve minus its
 reference, the GPS of a side the RMS of its nine, the overall GPS the RMS of fifteen, the pelvis once, left by
-convention (docs/science/norms-and-scores.md, "GVS and GPS"). RMS everywhere: averaging the GVS, or padding a
-side with zeros, gives less.
+convention (docs/science/norms-and-scores.md, "GVS and GPS"). RMS throughout: averaging the GVS, or padding a
+side with zeros, would give smaller values.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MeanCurves = Mapping[Side, Mapping[str, Floats]]
 
 @dataclass(frozen=True)
 class ScoreSpread:
-    """How a score, in degrees, is spread among healthy people; the ln figures serve GDI*."""
+    """Distribution of a score, in degrees, among healthy people; the ln values are for GDI*."""
 
     mean_deg: float
     sd_deg: float
@@ -52,15 +52,15 @@ class ScoreSpread:
 
 @dataclass(frozen=True, eq=False)
 class CurveReference:
-    """What curves are scored against.
+    """Reference for scoring curves.
 
     Parameters
     ----------
     mean_deg : variable → (101,).
-    spreads : mode → variable, or profile and "_side" or "_overall" → the people themselves, leave one out.
-    zero : what the angles are measured from; raw scores need curves with the same zero.
-    n, group, source : people, who, from where; printed beside every score.
-    speed_matched : they walked at the person's speed, else at their own.
+    spreads : mode → variable, or profile and "_side" or "_overall" → distribution of the people themselves,
+        leave-one-out. zero : zero of the angles; raw scores require curves with the same zero. n, group,
+        source : number, population, origin; printed with every score. speed_matched : they walked at the
+        person's speed, else at their comfortable one.
     """
 
     mean_deg: Mapping[str, Floats]
@@ -73,7 +73,9 @@ class CurveReference:
 
 
 def gvs(curve: Floats, reference: Floats, mode: Mode) -> Floats:
-    """Gait variable score of curves (..., 101) against one or as many: RMS over the cycle, same unit."""
+    """Gait variable score of curves (..., 101) relative to one or as many references: RMS over the cycle,
+    same unit.
+    """
     difference = curve - reference
     if mode == "offset_removed":
         difference = difference - difference.mean(axis=-1, keepdims=True)
@@ -81,14 +83,14 @@ def gvs(curve: Floats, reference: Floats, mode: Mode) -> Floats:
 
 
 def side_profile(scores: Mapping[str, float], variables: Sequence[str]) -> float | None:
-    """RMS of the GVS of one side, None unless all `variables` are there."""
+    """RMS of the GVS of one side, None unless all `variables` are available."""
     if any(v not in scores for v in variables):
         return None
     return float(_rms(np.array([scores[v] for v in variables])))
 
 
 def overall_profile(scores: Mapping[Side, Mapping[str, float]], variables: Sequence[str]) -> float | None:
-    """RMS of the GVS of both sides with the left pelvis only, None unless all are there."""
+    """RMS of the GVS of both sides with the left pelvis only, None unless all are available."""
     left, right = scores.get("left", {}), scores.get("right", {})
     rest = [v for v in variables if v not in PELVIS]
     if any(v not in left for v in variables) or any(v not in right for v in rest):
@@ -102,20 +104,20 @@ class PeopleCurves:
 
     Parameters
     ----------
-    curves : (people, 2, 101) of the left and the right side, 0 where there is none. there : (people, 2).
+    curves : (people, 2, 101) of the left and the right side, 0 if missing. there : (people, 2) availability.
     """
 
     curves: Floats
     there: Bools
 
     def means(self) -> Floats:
-        """Mean curve (n, 101) of the sides, of the one there is, of everybody who has any, in their order."""
+        """Mean curve (n, 101) over the available sides, for everyone with at least one, in order."""
         known = self.there.sum(axis=1)
         return np.asarray(self.curves.sum(axis=1)[known > 0] / known[known > 0, None])
 
 
 def gather_curves(people: Sequence[MeanCurves], variable: str) -> PeopleCurves:
-    """Lay the curves of one variable out; where nobody has it they have no samples."""
+    """Collect the curves of one variable; without any curve the arrays have no samples."""
     rows = [[person.get(side, {}).get(variable) for side in SIDES] for person in people]
     known = [row for pair in rows for row in pair if row is not None]
     shape = len(people), len(SIDES)
@@ -127,9 +129,9 @@ def gather_curves(people: Sequence[MeanCurves], variable: str) -> PeopleCurves:
 
 
 def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpread]]:
-    """Scores of healthy people, each against the mean of the others; a score of fewer than two is left out.
+    """Scores of healthy people, each relative to the mean of the others; omitted with fewer than two people.
 
-    A side counts by itself; percentiles are linear between order statistics, sd with n − 1.
+    Each side counts separately; percentiles are linear between order statistics, sd with n − 1.
     """
     shape = len(people), len(SIDES), len(NINE)
     scores, known = {mode: np.zeros(shape) for mode in MODES}, np.zeros(shape, np.bool_)
@@ -146,7 +148,7 @@ def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpr
 
 
 def _find_spreads(scores: Floats, known: Bools) -> dict[str, ScoreSpread]:
-    """Spreads of every variable and profile of scores (people, 2, 9), where they are known."""
+    """Spreads of every variable and profile of scores (people, 2, 9), where available."""
     values = {variable: scores[..., k][known[..., k]] for k, variable in enumerate(NINE)}
     flat = len(scores), len(SIDES) * len(NINE)
     for name, variables in PROFILES.items():
@@ -158,7 +160,7 @@ def _find_spreads(scores: Floats, known: Bools) -> dict[str, ScoreSpread]:
 
 
 def _find_profiles(scores: Floats, known: Bools, columns: Sequence[int]) -> Floats:
-    """RMS of some columns (..., n) wherever all of them are known."""
+    """RMS of some columns (..., n) where all of them are available."""
     # `take` lays them side by side, so that each is added up as the profile of one person is
     found = _rms(np.take(scores, columns, axis=-1))
     return np.asarray(found[np.take(known, columns, axis=-1).all(axis=-1)])

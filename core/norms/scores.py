@@ -1,10 +1,10 @@
-"""How far gait is from a reference, in one number each: GVS, GPS, gps_sagittal, GDI*.
+"""Summary scores of the deviation of gait from a reference: GVS, GPS, gps_sagittal, GDI*.
 
-docs/science/norms-and-scores.md, "GVS and GPS". Every score exists raw and with offsets removed. Raw needs
-curves with the zero of the reference; angles that are only known from the person's own standing have none,
-and say so. Half of a healthy adult's raw GPS is pure offset, so the two are never mixed. GDI* = 100 − 10 (ln
-GPS − mean) / sd with mean and sd of ln GPS of the reference people: 100 is their middle, every 10 below it
-one sd (after Schwartz & Rozumalski 2008); it is not the GDI, whose feature matrix nobody may ship.
+docs/science/norms-and-scores.md, "GVS and GPS". Every score exists raw and with offsets removed. Raw scores
+require curves with the zero of the reference; angles relative to the person's own standing have none, with a
+reason. Half of a healthy adult's raw GPS is pure offset, so the two are never mixed. GDI* = 100 − 10 (ln GPS
+− mean) / sd with mean and sd of ln GPS of the reference people: 100 is their mean, every 10 below it one sd
+(after Schwartz & Rozumalski 2008); it is not the GDI, whose feature matrix must not be redistributed.
 """
 
 from __future__ import annotations
@@ -47,21 +47,22 @@ NOTHING_DEG: Final = 1e-6
 
 @dataclass(frozen=True)
 class Score:
-    """One score, or why there is none.
+    """One score, or the reason for having none.
 
     Parameters
     ----------
     name : "gvs_deg", "gps_deg", "gps_sagittal_deg", "gdi_star", "gdi_star_sagittal".
     variable : of a GVS, else None. side : None = both.
     mode : "raw" or "offset_removed"; the two have different references.
-    value : in `unit`. n : strides behind it, the fewest of its curves.
-    healthy : spread of the score (of the GPS behind a GDI*) among the reference people, degrees.
-    percentile : of the reference people who score lower, by their log-normal spread; None for a GVS.
-    missing : variables it lacks. reason : "angle_zero_standing", "no_standing" (nobody stood still),
-        "no_level" (rotation and progression are measured from their own mean, never against the walking
-        direction), "joint_missing", "no_strides", "too_few_strides", "estimated" (no two sensors measure it),
+    value : in `unit`. n : number of strides, the minimum over its curves. healthy : spread of the score (of
+        the GPS for a GDI*) among the reference people, degrees.
+    percentile : percentage of reference people with a lower score, assuming a log-normal distribution; None
+        for a GVS.
+    missing : missing variables. reason : "angle_zero_standing", "no_standing" (no quiet standing), "no_level"
+        (rotation and progression are relative to their own mean, never to the walking direction),
+        "joint_missing", "no_strides", "too_few_strides", "estimated" (not measured by two sensors),
         "variables_missing" (several reasons, see the GVS), "no_reference", "no_norm_for_age", "score_zero"
-        (the very curves of the reference: no GDI*).
+        (identical to the curves of the reference: no GDI*).
     """
 
     name: str
@@ -79,13 +80,13 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """All scores of a session and whom they compare with.
+    """All scores of a session and their reference population.
 
     Parameters
     ----------
     scores : by mode: GVS of nine variables of each side, then profiles and indices. The movement analysis
         profile (MAP) is the set of GVS with the GPS: `profile`.
-    reference_n, group, source, zero : of the reference people, printed beside the scores.
+    reference_n, group, source, zero : of the reference people, printed with the scores.
     speed_matched : the reference people walked at the person's speed; False: at their comfortable one.
     """
 
@@ -109,7 +110,7 @@ class Scores:
 
 
 class CurveMeans:
-    """Means of the counted strides as scores need them, of curves that are added as they come.
+    """Means of the counted strides for scoring, accumulated from curves as they arrive.
 
     Parameters
     ----------
@@ -123,7 +124,7 @@ class CurveMeans:
         self.level: dict[Key, MeanCurve] = {}
 
     def add(self, curves: CycleCurves) -> None:
-        """Take in some or all curves, from standing."""
+        """Add some or all curves, relative to standing."""
         self.there.update((v, side) for v, sides in curves.curves.items() for side in sides)
         self.own |= _means(curves)
         self.level |= _means(anatomical_curves(curves, self.standing_deg))
@@ -141,13 +142,13 @@ def score_curves(
 
     Parameters
     ----------
-    curves : from standing.
-    standing_deg : goniometer angles in standing (`sagittal.core.parameters.anatomical_zero`).
+    curves : relative to standing. standing_deg : goniometer angles in standing
+        (`sagittal.core.parameters.anatomical_zero`).
     reference : None = 42 healthy adults at their comfortable speed; at the person's own:
         `sagittal.core.norms.adult_reference_at_speed`.
-    estimated : variables no two sensors measure; they are not scored.
-    age : years; below 18 there is no score against adults (`no_norm_for_age`). None = an adult.
-    means : where the curves are not held any more; then `curves` has only what is known beside them.
+    estimated : variables not measured by two sensors, which are not scored. age : years; below 18 there is no
+        score relative to adults (`no_norm_for_age`). None = adult. means : if the curves are no longer in
+        memory; `curves` then contains only metadata.
     """
     if means is None:
         means = CurveMeans(standing_deg or {})
@@ -253,7 +254,7 @@ def _profile(
 
 
 def _z(value: float | None, healthy: ScoreSpread | None) -> float | None:
-    """Standard deviations of ln GPS above the reference people; None where they have no spread."""
+    """Standard deviations of ln GPS above the reference people; None without a spread."""
     if value is None or value < NOTHING_DEG:
         return None
     if healthy is None or healthy.mean_ln is None or not healthy.sd_ln:

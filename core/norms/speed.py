@@ -1,9 +1,10 @@
-"""Walking speed as norms are chosen by it: free of the length of the legs.
+"""Walking speed normalised to leg length for the selection of norms.
 
 docs/science/norms-and-scores.md, "Speed". Dimensionless speed v / √(g L) (Hof 1996, Gait & Posture 4:222)
-makes short and tall people alike. The walkway norms are of adults with legs of about 0.9 m, so a person's
-speed is also told as the speed of such legs; where the height is not known it is the speed itself. The norms
-by speed measure the leg shorter: their dimensionless speed is one of its own.
+makes short and tall people comparable. The walkway norms are from adults with legs of about 0.9 m, so a
+person's speed is also expressed as the equivalent speed of such legs; without a known height it is the speed
+itself. The norms by speed use a shorter definition of leg length and therefore a separate dimensionless
+speed.
 """
 
 from __future__ import annotations
@@ -49,14 +50,14 @@ FASTEST: Final = (WBDS_MPS[0] + SPEED_SD * WBDS_MPS[1]) / sqrt(GRAVITY * NORM_LE
 
 @dataclass(frozen=True)
 class WalkingSpeed:
-    """A person's speed beside that of the reference people.
+    """A person's speed relative to that of the reference people.
 
     Parameters
     ----------
-    speed_mps : as measured. leg_m : hip to floor, None = height not known.
+    speed_mps : as measured. leg_m : hip to floor, None = height unknown.
     dimensionless : v / √(g L), None without the height.
-    equivalent_mps : the same dimensionless speed on legs of 0.9 m; without the height the speed itself.
-    norm_leg_m : leg as the norms by speed measure it.
+    equivalent_mps : the same dimensionless speed for legs of 0.9 m; without the height the speed itself.
+        norm_leg_m : leg length as defined by the norms by speed.
     """
 
     speed_mps: float
@@ -67,24 +68,24 @@ class WalkingSpeed:
 
     @property
     def is_slow(self) -> bool:
-        """Slower than anybody in the tables of comfortable walking."""
+        """Whether it is slower than all people in the tables of comfortable walking."""
         return self.equivalent_mps < SLOW_MPS
 
     @property
     def is_fast(self) -> bool:
-        """Faster than the adults of the angle norms walked."""
+        """Whether it is faster than the adults of the angle norms."""
         return self.norm_speed > FASTEST
 
     @property
     def norm_speed(self) -> float:
-        """Dimensionless speed v* as the norms by speed count it."""
+        """Dimensionless speed v* as defined by the norms by speed."""
         return self.speed_mps / sqrt(GRAVITY * self.norm_leg_m)
 
 
 def walking_speed(
     speed_mps: float, height_m: float | None = None, leg_m: float | None = None
 ) -> WalkingSpeed:
-    """Relate a speed to the legs that made it.
+    """Relate a speed to leg length.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The reference tables as shipped: package data, read once. Origin and licence of each: data/SOURCES.md."""
+"""The reference tables shipped as package data, read once. Origin and licence of each: data/SOURCES.md."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def read_rows(name: str) -> tuple[Mapping[str, str], ...]:
 
 
 def read_columns(name: str, *columns: str) -> Iterator[tuple[str, ...]]:
-    """Some columns of one table, row by row; of a large one less is kept than all its rows by name."""
+    """Some columns of one table, row by row; for a large table this needs less memory than all rows by
+    name.
+    """
     rows = _read_cells(name)
     header = next(rows)
     return map(itemgetter(*map(header.index, columns)), rows)
@@ -41,7 +43,7 @@ def _read_cells(name: str) -> Iterator[list[str]]:
 
 
 def wbds_group(age: float | None) -> str | None:
-    """WBDS age group of a person; all adults when the age is not known, None below 18 years."""
+    """WBDS age group of a person; all adults for an unknown age, None below 18 years."""
     if age is None:
         return "adult_21_84"
     if age < ADULT_AGE:

@@ -8,6 +8,7 @@ from math import hypot, sqrt
 from typing import Final, Literal, cast
 
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 from sagittal.core.norms.speed import WBDS_MPS
 from sagittal.core.norms.tables import LEVEL, WBDS, WBDS_N, read_rows, wbds_group
 from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey, find_entry
@@ -40,10 +41,10 @@ class NormValue:
 
     Parameters
     ----------
-    mean, sd : over people, of a single side where there are sides, in the unit the name ends with.
-    n : people, None where the source gives none.
-    difference_sd : sd of left − right in healthy people, None if not known.
-    comparable : False where our value has another zero, or where mean ± sd is not a spread; see `note`.
+    mean, sd : over people, for a single side of bilateral parameters, in the unit given by the end of the
+        name. n : people, None if not stated in the source.
+    difference_sd : sd of left − right in healthy people, None if unknown. comparable : False if our value has
+        a different zero, or if mean ± sd is not a spread; see `note`.
     """
 
     name: str
@@ -59,14 +60,16 @@ class NormValue:
 
 @dataclass(frozen=True, eq=False)
 class NormValues:
-    """Values by parameter, or none and the reason: "no_norm_for_age", "age_unknown", "sex_unknown"."""
+    """Values by parameter, or none with the reason "no_norm_for_age", "age_unknown", "sex_unknown"."""
 
     values: Mapping[str, NormValue] = field(default_factory=dict)
     reason: str | None = None
 
 
 def withdraw_shares(values: Mapping[str, NormValue], contacts_s: float | None) -> dict[str, NormValue]:
-    """References where shares of the stride compare only if the contacts are known to `COARSE_S`."""
+    """References in which phases as a percentage of the stride are comparable only with contacts known to
+    `COARSE_S`.
+    """
     if contacts_s is not None and contacts_s <= COARSE_S:
         return dict(values)
     return {
@@ -85,7 +88,7 @@ def list_norm_keys(table: Literal["angles", "walkway"]) -> dict[str, NormKey]:
 
 
 def is_angle(name: str) -> bool:
-    """The reference of a parameter is that of the adults of the cycle curves."""
+    """Whether the reference of a parameter comes from the adults of the cycle curves."""
     entry = find_entry(name)
     return entry is not None and entry.norm is not None and entry.norm.table == "angles"
 
@@ -93,7 +96,7 @@ def is_angle(name: str) -> bool:
 def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormValues:
     """Reference of the angle parameters for an adult of this age (None = all adults).
 
-    Ranges compare always, levels only of the variables in `anatomical`
+    Ranges are always comparable, levels only for the variables in `anatomical`
     (`sagittal.core.parameters.anatomical_zero`).
     """
     group = wbds_group(age)
@@ -122,8 +125,8 @@ def angle_values(age: float | None, anatomical: Collection[str] = ()) -> NormVal
 def single_side_sd(mean_sd: float, difference_sd: float) -> float:
     """sd of one side between people from the sd of their mean of both sides and of left − right.
 
-    The table's sd is of the mean of both sides, narrower than what a single side is held against:
-    var(side) = var(mean) + var(left − right) / 4, averaged over the sides.
+    The table has the sd of the mean of both sides, which is smaller than that of a single side: var(side) =
+    var(mean) + var(left − right) / 4, averaged over the sides.
     """
     return hypot(mean_sd, 0.5 * difference_sd)
 
@@ -140,13 +143,17 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
         row = table[key.row]
         note = _BAND if row["kind"] != "mean_sd" else _DIFFERS[key.differs]
         first, last = row["age_min"], row["age_max"]
-        ages = f"{first} years" if first == last else f"{first} to {last} years"
+        ages = (
+            Message("{first} years", first=first)
+            if first == last
+            else Message("{first} to {last} years", first=first, last=last)
+        )
         values[name] = NormValue(
             name=name,
             mean=float(row["mean"]),
             sd=float(row["sd"]),
             n=None,
-            group=f"{sex}, {ages}, {pace} pace",
+            group=Message("{sex}, {ages}, {pace} pace", sex=sex, ages=ages, pace=pace),
             source=row["source"],
             comparable=not note,
             note=note,
@@ -155,16 +162,16 @@ def temporal_values(age: float | None, sex: Sex | None, pace: Pace = "normal") -
 
 
 def explain_difference(name: str) -> str:
-    """Why a walkway's reference of a parameter says nothing about ours; empty where it compares."""
+    """Why the walkway reference of a parameter is not comparable with ours; empty if it is."""
     norm = CATALOGUE[name].norm
     return "" if norm is None else _DIFFERS[norm.differs]
 
 
 def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:
-    """Speed at which healthy people of this age like to walk: what a person's speed itself is held against.
+    """Comfortable speed of healthy people of this age: reference for a person's own speed.
 
-    By age and sex where the walkway tables have a mean, else of the adults of the angle norms; None for
-    children of whom only the range of a pace class is known.
+    By age and sex if the walkway tables have a mean, else that of the adults of the angle norms; None for
+    children with only a range for the pace class.
     """
     if age is not None and sex is not None:
         found = temporal_values(age, sex).values.get("gait_speed_mps")
@@ -179,10 +186,10 @@ def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:
 
 
 def pace_of(age: float | None, sex: Sex | None, speed_mps: float | None) -> Pace | None:
-    """Class of walkway norms a speed falls into, None where no such people walked at this speed.
+    """Class of the walkway norms for a speed, None if no such people walked at this speed.
 
-    Ages with slow, normal and fast classes have a range of speed for each; the others walked at the one
-    speed they liked and are "normal". Without a speed, age or sex: "normal".
+    Ages with slow, normal and fast classes have a speed range for each; the others walked only at comfortable
+    speed and are "normal". Without a speed, age or sex: "normal".
     """
     if age is None or sex is None or speed_mps is None:
         return "normal"
@@ -200,8 +207,8 @@ def predict_at_speed(
 ) -> Mapping[str, NormValue]:
     """Step length and cadence expected at a walking speed, 0.5 to 1.5 m/s on a treadmill; empty outside.
 
-    y = a·v^b with a log-normal residual; `sd` is its width to first order. With the leg
-    length it is fitted dimensionless: step length / L and cadence √(L / g) against v / √(g L).
+    y = a·v^b with a log-normal residual; `sd` is its width to first order. With the leg length the
+    dimensionless fit is used: step length / L and cadence √(L / g) against v / √(g L).
     """
     if not 0.5 <= speed_mps <= 1.5:
         return {}
@@ -222,7 +229,7 @@ def predict_at_speed(
             mean=mean,
             sd=mean * float(row["resid_sd_ln"]),
             n=int(row["n"]) // _SPEEDS,
-            group=f"{group.lower()} adults at this speed on a treadmill",
+            group=Message("{lower} adults at this speed on a treadmill", lower=group.lower()),
             source="BMClab h2a (MIT)",
         )
     return values

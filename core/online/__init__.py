@@ -1,4 +1,4 @@
-"""The same stages as offline, sample by sample: everything is a pure function of the samples in order."""
+"""The offline stages sample by sample: everything is a pure function of the samples in order."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """The estimator itself, on demand: it brings numba, which readers of frames do without."""
+    """Lazy import of the estimator: it requires numba, which readers of frames do not need."""
     if name in ("OnlineSession", "OnlineParams", "compile_live_kernels"):
         from sagittal.core.online import session
 

@@ -1,4 +1,4 @@
-"""The offline calibration on the samples of a live attempt, and what it gives to the chain behind it."""
+"""The offline calibration on the samples of a live attempt, and its result for the live chain."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from sagittal.core.frames import Segment
 from sagittal.core.fusion.attitude import compile_attitude_kernel
 from sagittal.core.fusion.mahony import MahonyParams, estimate_orientations
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.online.frame import SegmentCheck
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.filtering import low_pass
@@ -33,12 +34,12 @@ from sagittal.core.signals.rest import compile_rest_kernels
 
 @dataclass(frozen=True)
 class MountingParams:
-    """Parameters of the stages that find how the sensors sit: those of the offline pipeline.
+    """Parameters of the stages that estimate the sensor alignment: those of the offline pipeline.
 
     Parameters
     ----------
-    erkf : of the filter that the forward axes are made to agree with, as `PoseParams.erkf`.
-    joints : of the comparison beside the joints, as `AgreementParams.joints`.
+    erkf : of the filter used to align the forward axes, as `PoseParams.erkf`. joints : of the comparison at
+        the joints, as `AgreementParams.joints`.
     """
 
     calibration: CalibrationParams = field(default_factory=CalibrationParams)
@@ -49,19 +50,20 @@ class MountingParams:
 
 @dataclass(frozen=True, eq=False)
 class LiveCalibration:
-    """How the sensors sit, and the samples it was found on.
+    """Sensor alignment, and the samples it was estimated from.
 
     Parameters
     ----------
     calibrated : samples of the working segments from `first` on, t_s from 0; its windows are in that time.
-        Mountings are final: legs apart, forward axes agreed with the joints where the ErKF runs.
-    orientations : of these samples, both ways (not causal); for comparison, not to go on from.
+        The alignment is final: leg inclination corrected, forward axes consistent with the joints if the ErKF
+        runs.
+    orientations : of these samples, smoothed (not causal); for comparison, not for continuation.
     first, past : on the live axis, index of the recording's first sample and the one after its last. The
-        chain goes through [first, past) to catch up and goes on with the axis' sample `past`.
+        chain processes [first, past) to catch up and continues with sample `past` of the axis.
     body : lengths, with the standing width.
-    turned : segment → rad its forward axis was turned to agree with the joints; empty without ErKF.
-    checks : one per worn segment, also of those that could not be calibrated. ok : none of them is doubtful.
-    score : of these samples, as of any take.
+    turned : segment → correction of its forward axis by the joints, rad; empty without ErKF. checks : one per
+        segment with a sensor, including those that could not be calibrated. ok : none of them is doubtful.
+        score : of these samples, as for any recording.
     """
 
     calibrated: CalibratedRecording
@@ -83,16 +85,16 @@ def finish_calibration(
     params: MountingParams,
     out: Collection[Segment] = (),
 ) -> LiveCalibration:
-    """What follows the calibration proper offline, too: legs apart, forward axes that agree.
+    """Steps after the calibration proper, as offline: leg inclination, consistent forward axes.
 
     Parameters
     ----------
-    calibrated : as `sagittal.core.calibration.calibrate` gives it. worn : all segments, also those
-        without samples. out : of these, sensors that do not measure, which was told.
+    calibrated : result of `sagittal.core.calibration.calibrate`. worn : all segments, including those without
+        samples. out : those whose sensor does not measure, already reported.
 
     Raises
     ------
-    EstimationError of `sagittal.core.fusion.mahony.estimate_orientations`.
+    EstimationError as `sagittal.core.fusion.mahony.estimate_orientations`.
     """
     recording = calibrated.recording
     # every sensor with a sample counts: which of them last, nobody knows yet
@@ -124,8 +126,11 @@ def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notic
     return [
         Notice(
             "sensor_missing",
-            f"The {s} sensor sent nothing while the others stood; the take goes on without it. Connect it "
-            "and calibrate again.",
+            Message(
+                "The {value} sensor sent nothing while the others stood; the take goes on without "
+                "it. Connect it and calibrate again.",
+                value=s,
+            ),
             sensor=s,
         )
         for s in worn
@@ -142,7 +147,9 @@ def _check(segment: Segment, calibrated: CalibratedRecording, notices: Sequence[
 
 
 def compile_calibration_kernels() -> None:
-    """Load and compile all that a calibration needs, so that the first one does not take a second longer."""
+    """Load and compile everything required by a calibration, so that the first one is not delayed by a
+    second.
+    """
     import scipy.ndimage  # noqa: F401
 
     low_pass(np.arange(9.0), 1.0, 100.0)

@@ -1,8 +1,9 @@
-"""Calibration while the samples come: stand, walk, and the offline calibration as soon as there is enough.
+"""Calibration in real time: stand, walk, and the offline calibration as soon as there are enough samples.
 
-All is judged at fixed samples of the axis, every half second, so that it is a function of the samples and not
-of the blocks they came in. Standing and walking are told apart by the offline rules (core/signals/rest.py,
-core/calibration/walking.py); that enough was walked is said by the offline calibration itself.
+Evaluated at fixed samples of the axis, every half second, so that the result depends on the samples and not
+on their division into blocks. Standing and walking are distinguished by the offline rules
+(core/signals/rest.py, core/calibration/walking.py); the offline calibration itself decides whether the walk
+was sufficient.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from sagittal.core.calibration.live_standing import (
 from sagittal.core.calibration.walking import moving_mask
 from sagittal.core.errors import Notice, SagittalError, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.online.calibrated import LiveCalibration, MountingParams, finish_calibration
 from sagittal.core.online.frame import CalibrationView, SegmentCheck, Stage
 from sagittal.core.plurals import plural
@@ -37,22 +39,23 @@ from sagittal.core.timeline.live import UniformBlock
 
 @dataclass(frozen=True)
 class CalibratingParams:
-    """When the stages end.
+    """Transitions between the stages.
 
     Parameters
     ----------
-    tick_s : time between judgements.
-    wait_s : after it the attempt goes on without a sensor that sends nothing (our choice).
-    stand_s : standing that is asked for (in the clinic 3 to 5 s: docs/science/calibration.md, "Recipe").
-        looked_s : of the last samples in which it is looked for; quietness is judged against the quietest
-        second in them.
-    steps, walk_s : straight steps that are enough, or else time walked, as in small rooms, with at least
-        `least_steps` of them: strapping sensors on is no walk.
-    moved : turn of a sensor against the vertical from one standing to the next, beyond which it was moved on
-        the body or put on in between. People stand alike within 10° (our choice).
-    first_look_s : walking before the calibration is tried for the first time: two strides.
-    kept_s : samples kept while nobody walks: a standing and its beginning.
-    longest_s : an attempt that is not done by then starts anew (our choice).
+    tick_s : evaluation interval.
+    wait_s : after this time the attempt continues without a sensor that sends no data (our choice).
+    stand_s : required standing time (in the clinic 3 to 5 s: docs/science/calibration.md, "Recipe").
+        looked_s : duration of the last samples searched; quietness is relative to the quietest second in
+        them.
+    steps, walk_s : sufficient number of straight steps, or alternatively walking time, for small rooms, with
+        at least `least_steps` of them: attaching sensors is no walk.
+    moved : largest rotation of a sensor relative to the vertical between two standing periods; a larger one
+        means that it was moved on the body or attached in between. Standing is reproducible within 10° (our
+        choice).
+    first_look_s : walking time before the first calibration attempt: two strides. kept_s : samples retained
+        without walking: a standing period and its beginning. longest_s : timeout after which an attempt
+        restarts (our choice).
     """
 
     mounting: MountingParams = field(default_factory=MountingParams)
@@ -73,11 +76,11 @@ NOT_LOOKED: Final = CalibrationView(0.0, 0.0, 0, ())
 
 
 class LiveCalibrator:
-    """The stages of live calibration.
+    """State machine of the live calibration.
 
     Parameters
     ----------
-    wearer : segments in the order of the blocks' columns, rate, subject, protocol, mounting.
+    wearer : segments in the order of the block columns, rate, subject, protocol, placement.
     """
 
     def __init__(self, wearer: WornSensors, params: CalibratingParams | None = None) -> None:
@@ -97,15 +100,15 @@ class LiveCalibrator:
         self._functional = self._ongoing = False
 
     def drain_standings(self) -> tuple[int, ...]:
-        """Samples of the axis up to which a standing lasted that began an attempt, since the last call."""
+        """Samples of the axis at the end of standing periods that began an attempt, since the last call."""
         found, self._standings = tuple(self._standings), []
         return found
 
     def push(self, block: UniformBlock) -> LiveCalibration | None:
-        """Take the next samples; the calibration, once, when they complete it.
+        """Process the next samples; returns the calibration, once, when it is complete.
 
-        Samples of the block from the calibration's `past` on are not in it. Blocks may be left out while it
-        runs; a new attempt begins with the next that is pushed.
+        Samples of the block from the calibration's `past` on are not included. Blocks may be omitted while it
+        runs; a new attempt begins with the next one pushed.
         """
         if block.first != self._length:
             self._length = self._begun = block.first
@@ -127,14 +130,14 @@ class LiveCalibrator:
         return None
 
     def _leave_out(self, out: Bools) -> None:
-        """Go on without sensors (n,) that were found not to measure."""
+        """Continue without sensors (n,) found not to measure."""
         self._out = frozenset(s for s, x in zip(self.wearer.segments, out, strict=True) if x)
         self._working = tuple(s for s in self._working if s not in self._out)
         if self.stage == "walk" and not self._working:
             self._restart(None)
 
     def redo(self) -> None:
-        """Begin anew with the next sample that is pushed."""
+        """Restart with the next sample pushed."""
         self._restart(None)
         self.view = NOT_LOOKED
 
@@ -153,7 +156,7 @@ class LiveCalibrator:
         return self._look_for_walk()
 
     def _look_for_standing(self) -> None:
-        """Waiting or standing: is every sensor there, and for how long have all been still?"""
+        """Waiting or standing: check for data of every sensor, and for how long all have been still."""
         p, rate = self.params, self.wearer.rate_hz
         self._attempt.keep_last(round(p.looked_s * rate))
         there = self._there()
@@ -169,20 +172,22 @@ class LiveCalibrator:
             self._stand(recording, seen)
 
     def _stand(self, recording: UniformRecording, seen: StandingNow) -> None:
-        """Begin with this standing; what was before it is of no attempt, walking least of all."""
+        """Start an attempt with this standing period; earlier samples, walking in particular, are
+        discarded.
+        """
         self._attempt.keep_last(round(seen.stood_s * self.wearer.rate_hz))
         self._up, self._walked = find_upward_axes(recording), 0.0
         self._standings.append(self._length)
         self.view = replace(self.view, walked_s=0.0, steps=0)
 
     def _there(self) -> tuple[Segment, ...]:
-        """Segments whose sensor was there for most of the last second."""
+        """Segments with sensor data for most of the last second."""
         share = self._attempt.valid(round(self.wearer.rate_hz)).mean(axis=0)
         there = (s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
         return tuple(s for s in there if s not in self._out)
 
     def _look_for_walk(self) -> LiveCalibration | None:
-        """Standing is there: has enough been walked since?"""
+        """Walking: check whether enough has been walked since standing."""
         p, rate = self.params, self.wearer.rate_hz
         recording = self._attempt.recording(self._working)
         seen = judge_standing(cut_last_part(recording, p.kept_s), p.mounting.calibration.rest)
@@ -197,9 +202,10 @@ class LiveCalibrator:
         self._walked, before = walked, self._walked
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
         if walked and seen.stood_s >= p.stand_s and (moved := self._moved(recording)):
-            message = (
-                f"{', '.join(moved)}: the sensor sits otherwise than when all stood before. What was walked "
-                "until now does not count; this standing does."
+            message = Message(
+                "{moved}: the sensor sits otherwise than when all stood before. What was walked until "
+                "now does not count; this standing does.",
+                moved=", ".join(moved),
             )
             self._stand(recording, seen)
             self.view = replace(self.view, problem=Notice("sensor_moved", message, moved[0]))
@@ -213,21 +219,29 @@ class LiveCalibrator:
         look = not ongoing and (walked > before or before_ongoing)
         found = self._calibration(recording) if walked >= p.first_look_s and look else None
         if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
-            message = (
-                f"Only {walked:.0f} s were walked in {p.longest_s:.0f} s, {p.walk_s:.0f} s or {p.steps} "
-                "straight steps are needed. Stand still again, then walk straight ahead."
+            message = Message(
+                "Only {walked:.0f} s were walked in {longest_s:.0f} s, {walk_s:.0f} s or {steps} straight "
+                "steps are needed. Stand still again, then walk straight ahead.",
+                walked=walked,
+                longest_s=p.longest_s,
+                walk_s=p.walk_s,
+                steps=p.steps,
             )
             self._restart(Notice("walk_too_short", message))
         return found
 
     def _moved(self, recording: UniformRecording) -> list[Segment]:
-        """Segments whose sensor is turned against the vertical since the standing that began the attempt."""
+        """Segments whose sensor has rotated relative to the vertical since the standing that began the
+        attempt.
+        """
         now = find_upward_axes(recording)
         limit = np.cos(self.params.moved)
         return [s for s, x in self._up.items() if s in now and float(x @ now[s]) < limit]
 
     def _calibration(self, recording: UniformRecording) -> LiveCalibration | None:
-        """The calibration if it can be had and rests on enough; a walk that gives none begins anew."""
+        """The calibration if possible and sufficiently supported; a walk without result restarts the
+        attempt.
+        """
         p = self.params
         # who swings a leg or bows has the other leg and the trunk still to come
         late = self.view.walked_s >= p.walk_s and not self._functional
@@ -268,18 +282,21 @@ class LiveCalibrator:
 
 
 def _is_enough(facts: object) -> bool:
-    """Whether a segment was swung or bowed as often as is asked for."""
+    """Whether a segment was swung or bowed as often as required."""
     return isinstance(facts, Mapping) and facts["repetitions"] >= facts["asked"]
 
 
 def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
-    """Why a calibration from so much walking is not taken."""
+    """Why a calibration from this much walking is rejected."""
     unknown = (n for n in found.notices if n.sensor is not None and n.sensor not in found.segments)
     if (told := next(unknown, None)) is not None:
         return told
-    message = (
-        f"{params.walk_s:.0f} s of movement held about {steps} straight "
-        f"{plural(steps, 'step', 'steps')}, {params.least_steps} are "
-        "needed. Stand still again, then walk straight ahead."
+    message = Message(
+        "{walk_s:.0f} s of movement held about {steps} straight "
+        f"{plural(steps, 'step', 'steps')}, {{least_steps}} are needed. Stand still again, "
+        "then walk straight ahead.",
+        walk_s=params.walk_s,
+        steps=steps,
+        least_steps=params.least_steps,
     )
     return Notice("few_steps", message)

@@ -1,7 +1,7 @@
-"""The chain behind calibration: samples in, body, angles, contacts and strides out.
+"""The live chain after calibration: samples in, poses, angles, contacts and strides out.
 
-It starts where the person stood still, goes through what was recorded since and on with every new sample.
-Every part keeps its own state, so that any division of the samples into blocks gives the same bits.
+It starts at the standing period, processes the samples recorded since, and continues with every new sample.
+Every part keeps its own state, so that results are bit-identical for any division into blocks.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from sagittal.core.frames import Bools, Floats, Segment, Side
 from sagittal.core.fusion.attitude import AttitudeParams
 from sagittal.core.fusion.live_attitude import AttitudeTracker
 from sagittal.core.fusion.live_drift import HeadingHold
+from sagittal.core.message import Message
 from sagittal.core.online.calibrated import LiveCalibration
 from sagittal.core.parameters.live.live_history import MOST, SampleHistory
 from sagittal.core.parameters.live.live_stride import LiveStride
@@ -45,8 +46,8 @@ from sagittal.core.signals.rest import index_window
 from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 NOT_LIVE: Final = (
-    "The sensors that are worn ({}) show no figure while they stream: for one, wear both feet, or the pelvis "
-    "and a whole leg. All is recorded and can be analysed afterwards."
+    "The sensors that are worn ({sensors}) show no figure while they stream: for one, wear both feet, or the "
+    "pelvis and a whole leg. All is recorded and can be analysed afterwards."
 )
 BROKEN: Final = (
     "The live filter lost its footing and shows no figure any more; recording goes on. Stand still and "
@@ -70,7 +71,7 @@ class ChainParams:
 
 
 class ChainOutput(NamedTuple):
-    """What a block gave: the body, angles (T, names) in rad, the rest in order of being known."""
+    """Output of a block: body poses, angles (T, names) in rad, events and strides in order of detection."""
 
     placed: BodyBlock
     angles: Floats
@@ -80,18 +81,17 @@ class ChainOutput(NamedTuple):
 
 
 class LiveChain:
-    """Everything behind calibration.
+    """All stages after calibration.
 
     Parameters
     ----------
-    calibration : its samples are gone through at once (`caught_up`).
-    columns : segments of the axis' columns, of which the calibrated ones are used.
-    first : its first sample on the axis, where standing begins.
-    surface : what is walked on.
+    calibration : its samples are processed immediately (`caught_up`).
+    columns : segments of the axis columns, of which the calibrated ones are used.
+    first : its first sample on the axis, where standing begins. surface : walking surface.
 
     Raises
     ------
-    EstimationError, SignalError when not even contacts can be told.
+    EstimationError, SignalError if not even contacts can be detected.
     """
 
     def __init__(
@@ -161,12 +161,12 @@ class LiveChain:
         return self._angles.names
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools, filled: Bools) -> ChainOutput:
-        """The next samples (T, columns, …) of the axis; filled : where samples were lost, as its blocks."""
+        """Process the next samples (T, columns, …) of the axis; filled : lost samples, as in its blocks."""
         signals = take_columns(acc, gyr, valid, self._columns)
         return self._advance(*signals, take_mask(filled, self._columns))
 
     def _choose(self, calibration: LiveCalibration) -> LivePoseEstimator:
-        """The estimator that the calibrated sensors allow, best first as offline."""
+        """The best estimator for the calibrated sensors, selected as offline."""
         calibrated, body, rate = calibration.calibrated, calibration.body, self.rate_hz
         mounted = calibrated.calibration.segments
         column = {s: i for i, s in enumerate(self.segments)}
@@ -185,7 +185,7 @@ class LiveChain:
         feet = FootPaths(filtered(alone)) if alone else None
         if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
             return LiveL7s(column, mounted, body, rate, feet, self.params.l7s)
-        message = NOT_LIVE.format(", ".join(self.segments))
+        message = Message(NOT_LIVE, sensors=", ".join(self.segments))
         self._notices.append(Notice("no_live_figure", message, severity="info"))
         return UnlinkedSensors(self.segments, feet)
 
@@ -208,7 +208,7 @@ class LiveChain:
         )
 
     def _catch_up(self, calibration: LiveCalibration, zero: slice) -> ChainOutput:
-        """Through the standing window as one block, then through what was walked."""
+        """Process the standing window as one block, then the samples of the walk."""
         signals = calibration.calibrated.recording.sensors
         acc = np.stack([signals[s].acc for s in self.segments], axis=1)
         gyr = np.stack([signals[s].gyr for s in self.segments], axis=1)
@@ -254,7 +254,7 @@ class LiveChain:
         return ChainOutput(placed, angles, tuple(x.event for x in known), strides, notices)
 
     def _measure(self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
-        """Angles (T, names) over those of standing; the first block is the standing."""
+        """Angles (T, names) relative to standing; the first block is the standing period."""
         q, known = placed.q, placed.known
         if self._tilting:
             here = self.segments.index("pelvis")
@@ -295,7 +295,7 @@ class LiveChain:
 
 
 def _joined(found: Sequence[ChainOutput]) -> ChainOutput:
-    """Outcomes of blocks that follow each other as one."""
+    """Concatenate the output of consecutive blocks."""
     last = found[-1]
     return ChainOutput(
         placed=last.placed,

@@ -1,8 +1,8 @@
-"""What the live chain says: a frame after every push, a stride at every initial contact.
+"""Output of the live chain: a frame after every push, a stride at every initial contact.
 
 Everything here is plain values on the axis of core/timeline/live.py: seconds from the first sample of the
-take, SI units and radians, names as in sagittal.core.angles and sagittal.core.parameters.
-Nothing imports numba.
+recording, SI units and radians, names as in sagittal.core.angles and sagittal.core.parameters. Nothing
+imports numba.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ class SegmentCheck:
 
     Parameters
     ----------
-    still : at rest now. method, score : as in `SegmentCalibration`; None before the walk was looked at.
+    still : currently at rest. method, score : as in `SegmentCalibration`; None before the walk was evaluated.
     """
 
     segment: Segment
@@ -44,13 +44,13 @@ class SegmentCheck:
 
 @dataclass(frozen=True)
 class CalibrationView:
-    """How far calibration has come.
+    """Progress of calibration.
 
     Parameters
     ----------
-    stood_s, walked_s, steps : so far, of the attempt that is going on.
-    ok : True once it holds; False after an attempt that failed, `problem` says why.
-    score : pass or redo, why and what to do, once it holds; None before.
+    stood_s, walked_s, steps : so far, in the current attempt.
+    ok : True once it is valid; False after a failed attempt, with the reason in `problem`.
+    score : pass or redo, with reasons and remedies, once it is valid; None before.
     """
 
     stood_s: float
@@ -64,13 +64,13 @@ class CalibrationView:
 
 @dataclass(frozen=True)
 class SensorHealth:
-    """One sensor over the last seconds (core/online/health.py).
+    """State of one sensor over the last seconds (core/online/health.py).
 
     Parameters
     ----------
     rate_hz : as measured. lost_share, saturated_share : 0 to 1. silent_s : since its last sample, by the
-        other streams' clocks. still : at rest now. stuck : sends values that it does not measure.
-    doubt : code of what the other sensors say of it (core/agreement/live.py) and still holds.
+        clocks of the other streams. still : currently at rest. stuck : sends values that are not measured.
+        doubt : code of an active inconsistency with the other sensors (core/agreement/live.py).
     """
 
     id: str
@@ -86,7 +86,7 @@ class SensorHealth:
 
 @dataclass(frozen=True, eq=False)
 class AngleTrail:
-    """Angles since the frame before: t_s (m,), names (k), values (m, k) in rad, NaN where lost."""
+    """Angles since the previous frame: t_s (m,), names (k), values (m, k) in rad, NaN where lost."""
 
     t_s: Floats
     names: tuple[str, ...]
@@ -98,16 +98,16 @@ EMPTY_TRAIL: Final = AngleTrail(np.zeros(0), (), np.zeros((0, 0)))
 
 @dataclass(frozen=True, eq=False)
 class LiveFrame:
-    """State after the last sample that a push brought to the axis.
+    """State after the last sample that a push added to the axis.
 
     Parameters
     ----------
-    t_s : of that sample; 0 before the first. seq : of the batch that was pushed.
+    t_s : of that sample; 0 before the first. seq : of the batch pushed.
     calibration : None until all sensors stream.
-    q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`. valid : all segments of the figure are
-        measured. contact : side → on the floor, as far as events are known.
-    angles : name → rad, NaN where lost, at the last sample. trail : the same since the frame before.
-    events, strides, notices : new since the frame before; an event whose `first_s` is set was told before.
+    q : segment → (4,) segment to W. p : segment → (3,) m, as `Poses`. valid : all segments are measured.
+        contact : side → on the floor, as far as events are known.
+    angles : name → rad, NaN where lost, at the last sample. trail : the same since the previous frame.
+        events, strides, notices : new since the previous frame; an event with `first_s` was reported before.
     """
 
     t_s: float

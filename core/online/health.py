@@ -1,4 +1,4 @@
-"""How every sensor does: rate, losses, saturation and silence over the last seconds, by its batches."""
+"""Health of every sensor: rate, losses, saturation and silence over the last seconds, from its batches."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FULL: Final = 0.995
 
 
 class _Piece(NamedTuple):
-    """A batch: device times it begins and ends at, counts (k, 2) of what was measured and at its end."""
+    """A batch: device times of its start and end, counts (k, 2) of measured and of saturated samples."""
 
     start_us: int
     end_us: int
@@ -31,7 +31,7 @@ class _Piece(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _count(samples, limit, counts):  # type: ignore[no-untyped-def]
-    """Count (k, 2) of samples (m, k, 9) those that are whole, and those at an end (k, 6) of their range."""
+    """Count (k, 2) the complete samples (m, k, 9), and the saturated ones given the limits (k, 6)."""
     counts[:] = 0
     for i in range(samples.shape[1]):
         for s in range(samples.shape[0]):
@@ -60,7 +60,7 @@ class _StreamHealth:
         self.sent_us: int | None = None
 
     def push(self, batch: SampleBatch) -> None:
-        """Take a batch."""
+        """Add a batch."""
         self.sent_us = batch.sent_us
         step_us = round(1e6 / self.info.rate_hz)
         x, offsets_us = batch.samples, batch.offsets_us
@@ -80,7 +80,7 @@ class _StreamHealth:
         stuck: Collection[Segment],
         doubts: Mapping[Segment, str],
     ) -> list[SensorHealth]:
-        """Health of its sensors."""
+        """Health of the sensors of the stream."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
         totals = self._total.tolist()
         said = span_s, totals, silent_s, list(still), list(stuck), dict(doubts)
@@ -113,7 +113,7 @@ class _StreamHealth:
 
 
 class SensorHealthMonitor:
-    """All sensors of a take, those without a segment too."""
+    """All sensors of a recording, including those without a segment."""
 
     def __init__(self, hello: Hello) -> None:
         self._streams = {info.stream: _StreamHealth(info) for info in hello.streams}
@@ -121,7 +121,7 @@ class SensorHealthMonitor:
         self._now_us = 0
 
     def push(self, batch: SampleBatch) -> None:
-        """Take a batch of a known stream."""
+        """Add a batch of a known stream."""
         self._streams[batch.stream].push(batch)
         if self._begun_us is None:
             self._begun_us = batch.sent_us
@@ -137,7 +137,8 @@ class SensorHealthMonitor:
 
         Parameters
         ----------
-        still : segments at rest. stuck : that do not measure. doubts : segment → what others say of it.
+        still : segments at rest. stuck : those that do not measure. doubts : segment → code of an
+            inconsistency.
         """
         found: list[SensorHealth] = []
         for stream in self._streams.values():

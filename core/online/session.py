@@ -1,4 +1,4 @@
-"""One live take: batches in, frames out."""
+"""One live recording: batches in, frames out."""
 
 from __future__ import annotations
 
@@ -47,16 +47,16 @@ class OnlineParams:
 
 
 class OnlineSession:
-    """A take as it comes: a pure function of its batches and commands in order.
+    """A live recording: a pure function of its batches and commands in order.
 
     Parameters
     ----------
-    hello : its streams. subject : height, standing width, shoe. protocol : what is walked on and done.
-    mounting : segment → declared mounting. belt_speed_mps : of a treadmill, None = not entered.
+    hello : its streams. subject : height, standing width, shoe. protocol : task and surface. mounting :
+        segment → declared placement. belt_speed_mps : of a treadmill, None = not entered.
 
     Raises
     ------
-    SignalError `no_mapping`, `sample_rate_too_low`. ParameterError of `check_belt`.
+    SignalError `no_mapping`, `sample_rate_too_low`. ParameterError as `check_belt`.
     """
 
     def __init__(
@@ -90,13 +90,14 @@ class OnlineSession:
 
     @property
     def segments(self) -> tuple[Segment, ...]:
-        """Worn segments in the order of the axis' columns."""
+        """Segments with a sensor in the order of the axis columns."""
         return self._axis.segments
 
     def push(self, batch: SampleBatch) -> LiveFrame | None:
-        """Take the next batch of the log; the state after the samples it completes, None when it does not.
+        """Process the next batch of the log; returns the state after the samples it completes, None without
+        any.
 
-        Whoever has told what is in it calls `compare_sensors` then.
+        After the returned state has been delivered the caller should call `compare_sensors`.
         """
         self._health.push(batch)
         block = self._axis.push(batch)
@@ -136,19 +137,19 @@ class OnlineSession:
         )
 
     def compare_sensors(self) -> list[Notice]:
-        """What the sensors say about each other of the seconds that the last push completed; takes ms."""
+        """Run the sensor consistency checks on the seconds completed by the last push; takes milliseconds."""
         return self._agreement.compare()
 
     def guide_test(self) -> GuidedTestView | None:
-        """Where the functional test of the take stands; None of other takes. Takes ms once a second."""
+        """State of the functional test; None for other protocols. Takes milliseconds once per second."""
         return None if self._guided is None else self._guided.advance()
 
     def command(self, name: str, value: object = None) -> None:
-        """Do what the therapist asks for, from the next sample on; commands that are not known do nothing.
+        """Execute a command of the therapist, from the next sample on; unknown commands are ignored.
 
         Parameters
         ----------
-        name : "redo_calibration" or "test". value : of a test, "go", "repeat" or start_s and end_s.
+        name : "redo_calibration" or "test". value : for a test, "go", "repeat" or start_s and end_s.
         """
         if name == "redo_calibration":
             self.chain = None
@@ -164,7 +165,7 @@ class OnlineSession:
                 self._guided.correct(GivenLimits(value["start_s"], value["end_s"]))
 
     def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
-        """Start the chain and catch up; a calibration that no chain can run on is begun anew."""
+        """Start the chain and catch up; calibration restarts if no chain can run with its result."""
         try:
             self.chain = LiveChain(found, self.segments, self._surface, self.params.chain)
         except SagittalError as error:
@@ -175,7 +176,7 @@ class OnlineSession:
 
 
 def _tell(block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]) -> dict[str, Any]:
-    """What a frame has of the chain after the block's last sample."""
+    """Content of a frame from the chain after the block's last sample."""
     placed, angles = outcomes[-1].placed, outcomes[-1].angles
     here = min(len(angles), len(block))
     p = placed.p[-1]
@@ -196,7 +197,9 @@ def _tell(block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]
 
 
 def compile_live_kernels() -> None:
-    """Compile or load every kernel of the chain, so that the first take does not wait for it."""
+    """Compile every kernel of the chain or load it from the cache, so that the first recording is not
+    delayed.
+    """
     compile_calibration_kernels()
     compile_axis_kernels()
     compile_stuck_kernel()
@@ -213,7 +216,7 @@ def _compile_chain(worn: tuple[Segment, ...]) -> None:
 
 
 def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:
-    """A calibration of somebody who only stands, sensors along the segments' axes."""
+    """Calibration of a simulated person in quiet standing, sensors aligned with the segments."""
     acc = np.tile([0.0, GRAVITY, 0.0], (samples, 1))
     here = np.ones(samples, np.bool_)
     sensors = {s: SensorSignals(s, acc.copy(), np.zeros_like(acc), None, here.copy(), ~here) for s in worn}

@@ -1,5 +1,6 @@
-"""Curves from the anatomical zero: what a goniometer read in standing, added back
-(docs/science/joint-angles.md, "Anatomical zero")."""
+"""Curves relative to the anatomical zero: goniometer angles in standing, added back
+(docs/science/joint-angles.md, "Anatomical zero").
+"""
 
 from __future__ import annotations
 
@@ -17,11 +18,11 @@ from sagittal.core.subject.standing_angles import JOINTS, PELVIS, check_standing
 
 
 def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) -> CycleCurves:
-    """Curves from the anatomical zero: those whose standing angle was entered, and no others.
+    """Curves relative to the anatomical zero, only for variables with an entered standing angle.
 
     Parameters
     ----------
-    curves : from standing.
+    curves : relative to standing.
     standing_deg : goniometer angles in standing, `sagittal.core.subject.standing_angles.NAMES`.
 
     Raises
@@ -43,21 +44,23 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
 
 
 def standing_name(variable: str, side: Side) -> str:
-    """Name of the standing angle that a variable's curves of a side start from."""
+    """Name of the standing angle for the curves of a variable and side."""
     return variable if variable in PELVIS else f"{variable}_{SUFFIX[side]}"
 
 
 def standing_offset_deg(variable: str, side: Side, standing_deg: Mapping[str, float]) -> float:
-    """What is added to cycle curves from standing to make them anatomical, degrees; KeyError if not read."""
+    """Offset that converts cycle curves from standing to anatomical, degrees; KeyError if not measured."""
     # cycle curves of the left have the left side up
     sign = -1.0 if variable == "pelvis_obliquity" and side == "left" else 1.0
     return sign * standing_deg[standing_name(variable, side)]
 
 
 def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]) -> tuple[Parameter, ...]:
-    """Angle parameters from the anatomical zero, of the sides and variables whose standing angle was entered.
+    """Angle parameters relative to the anatomical zero, for sides and variables with an entered standing
+    angle.
 
-    Names are those of the parameters from standing; ranges, which have no zero, are not repeated.
+    Names are those of the parameters relative to standing; ranges, which are independent of the zero, are not
+    repeated.
     """
     level, figures = anatomical_curves(curves, standing_deg), list_curve_figures()
     found = tuple(
@@ -71,6 +74,6 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
 
 
 def anatomical_variables(standing_deg: Mapping[str, float]) -> tuple[str, ...]:
-    """Variables whose level is known on both sides, as the lookup of norms takes them."""
+    """Variables with a known level on both sides, for the lookup of norms."""
     joints = (v for v in JOINTS if all(f"{v}_{SUFFIX[s]}" in standing_deg for s in SIDES))
     return (*(v for v in PELVIS if v in standing_deg), *joints)

@@ -1,4 +1,4 @@
-"""Which parameters are measured between the contacts of both feet."""
+"""Parameters measured between the contacts of both feet."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ require_entries(BETWEEN_FEET, "core.parameters.between_feet")
 
 
 def withhold_between_feet(parameters: Sequence[Parameter], reason: str) -> tuple[Parameter, ...]:
-    """The same parameters, without the values of those that need the contacts of both feet."""
+    """The same parameters, with the values of those that need the contacts of both feet suppressed."""
     return tuple(
         summarise_values(p.name, p.side, [], p.unit, reason)
         if p.name in BETWEEN_FEET and p.mean is not None

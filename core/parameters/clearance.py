@@ -1,9 +1,9 @@
-"""How far heel and toe of the sole pass the floor in swing.
+"""Clearance of heel and toe of the sole above the floor in swing.
 
-Heights are above the line between the floor at the two flats of a stride, so that drift in height does not
-count (docs/science/spatial.md, "Clearance"). Without the shape of the shoe there is no clearance, and never
-that of the sensor in its place: the toe passes the floor by one or two centimetres (Winter 1992), less than
-shoes differ, and a heel 7 cm from where it is taken to be is 7 of 23 cm wrong on gaitmap_foot.
+Heights are relative to the line between the floor at the two foot-flats of a stride, so that height drift
+cancels (docs/science/spatial.md, "Clearance"). Without the shape of the shoe no clearance is reported, and
+never that of the sensor instead: toe clearance is one or two centimetres (Winter 1992), less than the
+differences between shoes, and a heel position error of 7 cm causes an error of 7 of 23 cm in gaitmap_foot.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ ClearanceReason = Literal["no_swing_minimum"]
 
 @dataclass(frozen=True, eq=False)
 class Spans:
-    """Stretches of a signal laid one behind the other.
+    """Concatenated spans of a signal.
 
     Parameters
     ----------
-    first, last : (spans,) samples, both included. start : (spans,) where each begins in the row of all.
-    sample, span : (samples,) sample of the signal, and which span it is of.
+    first, last : (spans,) samples, inclusive. start : (spans,) start of each in the concatenation. sample,
+        span : (samples,) sample of the signal, and index of its span.
     """
 
     first: NDArray[np.intp]
@@ -42,7 +42,7 @@ class Spans:
 
 
 def lay_out(first: NDArray[np.intp], last: NDArray[np.intp]) -> Spans:
-    """Lay out the stretches between two samples each, both included, the first before the last."""
+    """Concatenate the spans between two samples each, inclusive, the first before the last."""
     length = last - first + 1
     start = np.cumsum(length) - length
     span = np.repeat(np.arange(len(first)), length)
@@ -51,7 +51,7 @@ def lay_out(first: NDArray[np.intp], last: NDArray[np.intp]) -> Spans:
 
 @dataclass(frozen=True, eq=False)
 class SoleHeights:
-    """Heights (n,) in m of the ankle and of the sole's rear end and tip."""
+    """Heights (n,) in m of the ankle and of the rear end and tip of the sole."""
 
     ankle: Floats
     heel: Floats
@@ -59,7 +59,7 @@ class SoleHeights:
 
 
 def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
-    """Heights of the ends of the sole, None without the shoe's shape."""
+    """Heights of the ends of the sole, None without the shape of the shoe."""
     body = feet.body
     if body.sole_back is None or body.sole_front is None:
         return None
@@ -72,7 +72,7 @@ def sole_heights(feet: FootTracks, side: Side) -> SoleHeights | None:
 
 
 def measure_floor_heights(heights: SoleHeights, spans: Spans, ankle_height: float) -> tuple[Floats, Floats]:
-    """Heights (samples,) of heel and tip over the floor between the flats at the ends of spans, m."""
+    """Heights (samples,) of heel and tip above the floor between the foot-flats at the ends of spans, m."""
     a, b = heights.ankle[spans.first] - ankle_height, heights.ankle[spans.last] - ankle_height
     slope = (b - a) / (spans.last - spans.first)
     floor = a[spans.span] + slope[spans.span] * (spans.sample - spans.first[spans.span])
@@ -80,16 +80,17 @@ def measure_floor_heights(heights: SoleHeights, spans: Spans, ankle_height: floa
 
 
 def toe_clearance(h: Floats) -> float | ClearanceReason:
-    """Least height of the tip in mid-swing, m: the dip between its rises after foot-off and before contact.
+    """Minimum toe clearance in mid-swing, m: the minimum between the maxima after foot-off and before
+    contact.
 
     Parameters
     ----------
-    h : (n,) heights of the tip over the floor from foot-off to contact, m.
+    h : (n,) heights of the tip above the floor from foot-off to contact, m.
 
     Returns
     -------
-    "no_swing_minimum" where the tip only rises or only falls, as some hemiparetic swings do: any
-    number there would be that of the window's edge.
+    "no_swing_minimum" if the tip only rises or only falls, as in some hemiparetic swings: any number would be
+    determined by the edge of the window.
     """
     if len(h) < 3:
         return "no_swing_minimum"
@@ -100,7 +101,7 @@ def toe_clearance(h: Floats) -> float | ClearanceReason:
 
 
 def _height(feet: FootTracks, side: Side, forward: float, up: float) -> Floats:
-    """Height (n,) of a point of the foot's sagittal plane, by the third row of its rotation matrix."""
+    """Height (n,) of a point in the sagittal plane of the foot, from the third row of its rotation matrix."""
     w, x, y, z = feet.q[side].T
     along, vertical = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
     return np.asarray(feet.p[side][:, 2] + forward * along + up * vertical)

@@ -1,7 +1,7 @@
-"""Where a foot rests after each of its contacts: the places between which distances are measured.
+"""Foot-flat after each contact: the reference positions for distances.
 
-A foot's flat is the middle of its longest stillness between contact and foot-off, or the quietest moment of a
-stance without any (core/body/still.py).
+Foot-flat is the middle of the longest still period between contact and foot-off, or the quietest moment of a
+stance without one (core/body/still.py).
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ OTHER: Final[Mapping[Side, Side]] = {"left": "right", "right": "left"}
 
 @dataclass(frozen=True, eq=False)
 class Flats:
-    """Samples of the flats of strides, −1 where the foot never rests or there is no such contact.
+    """Foot-flat samples of strides, −1 if the foot never rests or there is no such contact.
 
     Parameters
     ----------
-    first, last : (strides,) after the contacts that begin and end the stride.
-    opposite : (strides,) of the other foot, after its contact inside.
+    first, last : (strides,) after the contacts that begin and end the stride. opposite : (strides,) of the
+        other foot, after its contact within.
     """
 
     first: NDArray[np.intp]
@@ -39,12 +39,12 @@ class Flats:
     opposite: NDArray[np.intp]
 
     def select(self, places: slice | NDArray[np.intp]) -> Flats:
-        """Those of some strides of the list."""
+        """Those of selected strides of the list."""
         return Flats(self.first[places], self.last[places], self.opposite[places])
 
 
 def find_flats(strides: Strides, feet: FootTracks) -> Flats:
-    """The flat after every initial contact that a stride begins, ends or crosses with."""
+    """Foot-flat after every initial contact that begins, ends or falls within a stride."""
     of = strides.columns
     stance = STANCE_SHARE * of.duration_s
     off = np.where(np.isnan(of.tc_s), of.start_s + stance, of.tc_s)
@@ -72,7 +72,7 @@ def find_flats(strides: Strides, feet: FootTracks) -> Flats:
 def _longest(
     feet: FootTracks, side: Side, first: NDArray[np.intp], past: NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Middle (m,) of a foot's longest rest within each range [first, past), −1 where it never rests."""
+    """Middle (m,) of a foot's longest rest within each range [first, past), −1 without any."""
     runs = np.array(find_runs(feet.still[side] & feet.valid[side]), np.intp).reshape(-1, 2)
     starts, stops = runs.T
     at, end = np.searchsorted(stops, first, "right"), np.searchsorted(starts, past, "left")

@@ -1,7 +1,8 @@
-"""JointAngles and Strides → curves over the gait cycle and the figures read from them.
+"""JointAngles and Strides → curves over the gait cycle and the parameters read from them.
 
 A curve has 101 points, 0 to 100 % from initial contact to the next of the same foot, by linear interpolation.
-The windows of the figures are those of the reference table (core/norms/data), so that both mean the same.
+The windows of the parameters are those of the reference table (core/norms/data), so that both have the same
+meaning.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ MEAN_ZERO: Final = ("pelvis_rotation", "foot_progression")
 
 
 def is_level(name: str) -> bool:
-    """The parameter is a joint angle with a zero, not a range: how the person stood is part of it."""
+    """Whether the parameter is a joint angle level, not a range, and thus depends on the standing posture."""
     entry = find_entry(name)
     return entry is not None and entry.curve is not None and entry.curve.statistic != "range"
 
@@ -57,10 +58,9 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     """Cut angles into gait cycles.
 
     Pelvis angles appear once per side, over that side's cycles; obliquity is positive with that side up.
-    Pelvic rotation (that side forward) and foot progression (toes in) are measured from their own mean over
-    the stride: against the walking direction they have no level (`MEAN_ZERO`).
-    A stride in which the angle is not known throughout is a row of NaN; one in which a knee bends the wrong
-    way as no knee can (`LEAST_KNEE`) as well.
+    Pelvic rotation (that side forward) and foot progression (toes in) are relative to their own mean over the
+    stride: they have no level relative to the walking direction (`MEAN_ZERO`). Strides with missing samples
+    of the angle are rows of NaN, as are those with an anatomically impossible knee extension (`LEAST_KNEE`).
     """
     curves: dict[str, dict[Side, Floats]] = {}
 
@@ -73,10 +73,10 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
 def measure_cycles(
     angles: JointAngles, strides: Strides
 ) -> tuple[CycleCurves, dict[str, dict[Side, Floats]]]:
-    """What is known about the curves of `cycle_curves`, and `stride_figures` of them.
+    """Metadata of the curves of `cycle_curves`, and their `stride_figures`.
 
-    The curves themselves are let go of as they are read, and are not there: those of an hour are as large as
-    its signals.
+    The curves themselves are discarded once read and are not included: for an hour they are as large as its
+    signals.
     """
     figures, found = list_curve_figures(), dict[str, dict[Side, Floats]]()
 
@@ -94,15 +94,15 @@ def read_cycles(
     strides: Strides,
     take: Callable[[CycleCurves, str, Side, Floats], None],
 ) -> CycleCurves:
-    """Hand every curve of `cycle_curves` to `take`, which lets it go or keeps it.
+    """Pass every curve of `cycle_curves` to `take`, which can keep or discard it.
 
     Parameters
     ----------
-    take : is given what is known beside the curves, variable, side and curve (strides, 101), rad.
+    take : called with the metadata, variable, side and curve (strides, 101), rad.
 
     Returns
     -------
-    What is known beside the curves.
+    The metadata of the curves.
     """
     of = strides.columns
     foot_off = 100.0 * (of.tc_s - of.start_s) / of.duration_s
@@ -148,7 +148,7 @@ def read_cycles(
 
 
 def _tell_withheld(withheld: Mapping[str, str]) -> dict[str, dict[Side, str]]:
-    """Variable → side → why it is not there."""
+    """Variable → side → reason for suppression."""
     why: dict[str, dict[Side, str]] = {}
     for name, reason in withheld.items():
         base, _, suffix = name.rpartition("_")
@@ -159,7 +159,7 @@ def _tell_withheld(withheld: Mapping[str, str]) -> dict[str, dict[Side, str]]:
 
 
 def _name_variables(angles: Iterable[str], side: Side) -> dict[str, str]:
-    """Angle → variable, of the angles of one side and those of neither."""
+    """Angle → variable, for the angles of one side and those without a side."""
     names = {}
     for name in angles:
         base, _, suffix = name.rpartition("_")
@@ -171,10 +171,10 @@ def _name_variables(angles: Iterable[str], side: Side) -> dict[str, str]:
 
 
 def mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
-    """Mean curve of the counted strides of a side; strides with gaps in this variable are left out.
+    """Mean curve of the counted strides of a side; strides with gaps in this variable are omitted.
 
-    Where more than half of them rest on the bound of a leg model there is no value, as in the figures. Worked
-    out once for these curves: panels and scores ask for the same ones.
+    There is no value where more than half of them are at the bound of a leg model, as for the parameters.
+    Cached per curves object: panels and scores request the same ones.
     """
     key = variable, side
     if key not in curves.means:
@@ -204,7 +204,7 @@ def _mean_curve(curves: CycleCurves, variable: str, side: Side) -> MeanCurve:
 
 
 def rest_at_bound(curves: CycleCurves, variable: str, side: Side, angle: Floats) -> Bools:
-    """Where an angle in rad, of any shape, is the bound of a leg model and no measurement."""
+    """Whether an angle in rad, of any shape, is at the bound of a leg model and not measured."""
     bound = curves.bounds.get(variable, {}).get(side)
     if bound is None:
         return np.zeros(angle.shape, np.bool_)
@@ -218,7 +218,7 @@ def stride_figures(
 
     Parameters
     ----------
-    figures : name → what is read from the curves; None = those of the catalogue.
+    figures : name → statistic to read from the curves; None = those of the catalogue.
     """
     values: dict[str, dict[Side, Floats]] = {}
     for name, figure in (list_curve_figures() if figures is None else figures).items():
@@ -228,7 +228,7 @@ def stride_figures(
 
 
 def _read_figure(figure: CurveFigure, rows: Floats) -> Floats:
-    """A figure (strides,) in degrees of curves (strides, 101) in rad."""
+    """A parameter (strides,) in degrees from curves (strides, 101) in rad."""
     if not len(rows):
         return np.empty(0)
     part = rows[:, figure.start_pct : figure.end_pct + 1]
@@ -248,7 +248,7 @@ def foot_pitch(
 
     Parameters
     ----------
-    pitch : of `foot_pitches`, where somebody has it already.
+    pitch : from `foot_pitches`, if already computed.
     """
     values: dict[str, dict[Side, Floats]] = {name: {} for name in FOOT_PITCH}
     for foot, angle in (foot_pitches(orientations) if pitch is None else pitch).items():
@@ -272,12 +272,13 @@ def summarise_angles(
 
     Parameters
     ----------
-    measured : figures of `measure_cycles`, `foot_pitch` and `turning_angle`; None = those of the curves.
+    measured : values from `measure_cycles`, `foot_pitch` and `turning_angle`; None = those of the curves.
 
     Returns
     -------
-    without a value a reason: "joint_missing" (a segment carries no sensor), "no_strides", "gap", "at_bound"
-    (in most strides), "no_standing" (levels of a take in which nobody stood), "estimator_bad", "impossible".
+    Parameters; without a value a reason: "joint_missing" (a segment has no sensor), "no_strides", "gap",
+    "at_bound" (in most strides), "no_standing" (levels in a recording without quiet standing),
+    "estimator_bad", "impossible".
     """
     read = list_curve_figures()
     figures: dict[str, Mapping[Side, Floats]] = {name: {} for name in read}
@@ -305,7 +306,7 @@ def summarise_angles(
 
 
 def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Bools:
-    """Figures (strides,) in degrees that are the bound of a leg model and no measurement."""
+    """Whether values (strides,) in degrees are at the bound of a leg model and not measured."""
     entry = CATALOGUE.get(name)
     figure = None if entry is None else entry.curve
     if figure is None or figure.statistic == "range":
@@ -316,8 +317,8 @@ def _at_bound(curves: CycleCurves, name: str, side: Side, values: Floats) -> Boo
 def without_bounds(
     curves: CycleCurves, figures: Mapping[str, Mapping[Side, Floats]]
 ) -> dict[str, dict[Side, Floats]]:
-    """The same figures (strides,), NaN in strides in which they are the bound of a leg model or a level of
-    angles that have none.
+    """The same values (strides,), NaN in strides in which they are at the bound of a leg model or are
+    levels of angles without a zero.
     """
     level = [name for name in figures if curves.zero == "walking" and is_level(name)]
     return {

@@ -1,7 +1,8 @@
-"""Events, a person's edits → strides → parameters: everything that follows the stride list, in one function.
+"""Events and manual edits → strides → parameters: everything after the stride list, in one function.
 
-The pipeline calls it at its end and the server after every edit, so that both give the same numbers. `Tracks`
-is what it needs of a finished analysis; nothing here filters a signal, and nothing imports numba.
+Called at the end of the pipeline and by the server after every edit, so that both give the same numbers.
+`Tracks` is the required part of a finished analysis; nothing here filters a signal, and nothing imports
+numba.
 """
 
 from __future__ import annotations
@@ -39,20 +40,20 @@ from sagittal.core.signals.rest import Window
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """What strides and parameters are measured on, all on one uniform axis.
+    """Data for measuring strides and parameters, all on one uniform axis.
 
     Parameters
     ----------
     t_s : (n,) s from recording start.
     events : as detected, before any edit.
-    q, valid : foot → (n, 4) foot to world, scalar first, and (n,) the sensor was there: heading and pitch.
-    turning : (n,) mask of the calibration, None if not known.
-    feet : paths of the feet, None where no distance can be measured. angles : None when not reached.
-    trunk : pelvis, chest → (n, 3) acceleration free of gravity, forward, left, up (m/s²): core/walking_frame.
+    q, valid : foot → (n, 4) foot to world, scalar first, and (n,) sensor available, for heading and pitch.
+    turning : (n,) mask of the calibration, None if unknown.
+    feet : paths of the feet, None if no distance can be measured. angles : None if not reached.
+    trunk : pelvis, chest → (n, 3) gravity-free acceleration, forward, left, up (m/s²): core/walking_frame.
     params : of the stride list. bout_params : of the walking bouts of the feet's contacts.
-    rests : windows of standing still, None if not known. standing : those of the feet alone, short ones too
-        (core/signals/rest.py, STANDING). turns : of the body. steps : of a trunk sensor,
-        where no foot carries one; they are not edited.
+    rests : windows of quiet standing, None if unknown. standing : those of the feet alone, including short
+        ones (core/signals/rest.py, STANDING). turns : of the body. steps : of a trunk sensor, if no foot has
+        one; they are not editable.
     """
 
     t_s: Floats
@@ -80,12 +81,12 @@ class Tracks:
 
 @dataclass(frozen=True, eq=False)
 class MeasuredGait:
-    """What the events and edits give.
+    """Result of measuring the events with edits.
 
     Parameters
     ----------
     columns : parameters of every stride of the list, counted or not, in its order.
-    bouts : walking without a long break. turns : of the body. steps : of a trunk sensor without foot sensors.
+    bouts : walking bouts. turns : of the body. steps : of a trunk sensor without foot sensors.
     """
 
     events: GaitEvents
@@ -98,7 +99,7 @@ class MeasuredGait:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Of the stride list and the steps."""
+        """Notices of the stride list and the steps."""
         return self.strides.notices + (() if self.steps is None else self.steps.notices)
 
 
@@ -115,8 +116,7 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
 
     Raises
     ------
-    ParameterError
-        An edit does not fit the events: `no_such_event`, `event_outside`, `event_order` of
+    ParameterError An edit does not match the events: `no_such_event`, `event_outside`, `event_order` of
         core/events/edits.py.
     """
     events = apply_event_edits(tracks.events, edits, tracks.duration_s)
@@ -142,7 +142,7 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
 
 
 def _is_measured(tracks: Tracks, side: Side, at_s: Floats) -> Bools:
-    """Whether a foot's sensor was there at times (n,) s; it was where no foot is known."""
+    """Whether the sensor of a foot was available at times (n,) s; assumed true without any known foot."""
     valid = tracks.valid.get(FOOT[side])
     if valid is None:
         return np.ones(len(at_s), np.bool_)
@@ -152,14 +152,14 @@ def _is_measured(tracks: Tracks, side: Side, at_s: Floats) -> Bools:
 
 
 def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:
-    """What one foot's clock may be late by, s; 0 where a chain of sensors links the feet, or none tells."""
+    """Estimated clock offset of one foot, s; 0 if a chain of sensors links the feet, or if undetermined."""
     if tracks.feet is not None and tracks.feet.linked:
         return 0.0
     return abs(measure_foot_lag(events, AlternationParams()) or 0.0)
 
 
 def _walked(tracks: Tracks, found: Strides, flats: Flats | None) -> Strides:
-    """The stride list, without strides that lead nowhere where the feet's paths are known."""
+    """The stride list, without strides in place if the paths of the feet are known."""
     marching = in_place(found, tracks.feet, tracks.surface, flats).tolist()
     if not marching:
         return found
@@ -170,7 +170,9 @@ def _walked(tracks: Tracks, found: Strides, flats: Flats | None) -> Strides:
 
 
 def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
-    """What the trunk tells; beside it, where feet were worn and not understood, what they do not tell."""
+    """Parameters from the trunk; in addition missing ones of foot sensors that gave no contacts, with
+    their reasons.
+    """
     told = (*step_parameters(steps), *_regular(tracks, steps))
     known = {(p.name, p.side) for p in told}
     return told + tuple(p for p in figures if tracks.q and (p.name, p.side) not in known)

@@ -1,8 +1,8 @@
 """The phases of Perry between the contacts: mid and terminal stance, initial, mid and terminal swing.
 
-Loading response and pre-swing are the two double supports (temporal.py) and have no second name here. What
-divides the others (Perry 1992): the heel rises; the swinging ankle passes the standing one; the tibia of the
-swinging leg is vertical. All in % of the stride, so that the seven add up to 100 where all are known.
+Loading response and pre-swing are the two double supports (temporal.py) and have no second name here. The
+others are delimited (Perry 1992) by heel rise, by the swinging ankle passing the supporting one, and by the
+tibia of the swinging leg being vertical. All in % of the stride; the seven add up to 100 if all are known.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ def measure_phases(
     pitch: dict[Segment, Floats],
     feet: FootTracks | None,
 ) -> Figures:
-    """Phases of every stride of the list, or why not.
+    """Phases of every stride of the list, or the reasons for missing ones.
 
     Parameters
     ----------
-    angles, pitch, feet : on one axis. The tibia's lean is the foot's pitch minus dorsiflexion; it is vertical
-        as while standing for calibration.
+    angles, pitch, feet : on one axis. The inclination of the tibia is the foot pitch minus dorsiflexion;
+        vertical is its orientation in standing for calibration.
 
     Returns
     -------
-    reasons: "no_standing" (where the tibia is vertical is known from standing), "opposite_foot_missing",
+    Phases with reasons: "no_standing" (the vertical tibia is defined by standing), "opposite_foot_missing",
     "no_terminal_contact", "no_foot_flat", "feet_not_linked", "joint_missing", "gap"; "no_mid_stance" and
-    "no_terminal_stance" where the heel rises outside single support; "feet_not_adjacent",
-    "tibia_not_vertical" where the swing has no such moment, or not in this order.
+    "no_terminal_stance" if the heel rises outside single support; "feet_not_adjacent", "tibia_not_vertical"
+    if the swing has no such moment, or not in this order.
     """
     found = (*_stance(strides, stances), *_swing(strides, angles, pitch, feet))
     return dict(zip(NAMES, found, strict=True))
 
 
 def _stance(strides: Strides, stances: Stances) -> tuple[Figure, Figure]:
-    """Mid and terminal stance: single support until the heel rises, and after."""
+    """Mid and terminal stance: single support before and after heel rise."""
     of = strides.columns
     heel_off, begins, ends = stances.heel_off_s, of.opposite_tc_s, of.opposite_ic_s
     percent = 100.0 / of.duration_s
@@ -102,7 +102,7 @@ def _swing(
 
 
 def _why_not_upright(side: Side, angles: JointAngles | None) -> str:
-    """Why the tibia of a side has no moment at which it is vertical."""
+    """Why the tibia of a side is never vertical."""
     if angles is None:
         return "joint_missing"
     if angles.zero == "walking":
@@ -117,7 +117,7 @@ def _swings(strides: Strides, own: NDArray[np.intp]) -> Floats:
 
 
 def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
-    """When (strides,) the swinging ankle passes the other, s; NaN if never or not known."""
+    """Time (strides,) at which the swinging ankle passes the other, s; NaN if never or unknown."""
     found = np.full(len(strides.strides), np.nan)
     if feet is None or not feet.linked or feet.withheld:
         return found
@@ -136,7 +136,9 @@ def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
 
 
 def _vertical(strides: Strides, angles: JointAngles | None, pitch: dict[Segment, Floats]) -> Floats:
-    """When (strides,) the swinging tibia last passes the vertical forwards, s; NaN if never or not known."""
+    """Last time (strides,) at which the swinging tibia passes the vertical forwards, s; NaN if never or
+    unknown.
+    """
     found = np.full(len(strides.strides), np.nan)
     for side in SIDES:
         ankle = None if angles is None else angles.angles.get(f"ankle_dorsiflexion_{SUFFIX[side]}")

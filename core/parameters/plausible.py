@@ -1,4 +1,4 @@
-"""What no person can do: a number beyond is an error of detection and reaches no table."""
+"""Physiological limits of parameters: values outside are detection errors and are not reported."""
 
 from __future__ import annotations
 
@@ -16,6 +16,6 @@ where nobody entered the standing angle: who stands with bent knees walks with t
 
 
 def is_impossible(name: str, value: float) -> bool:
-    """Tell whether no person can have this value of a parameter."""
+    """Whether a value of a parameter is physiologically impossible."""
     entry = CATALOGUE.get(name)
     return entry is not None and (value < entry.plausible[0] or value > entry.plausible[1])

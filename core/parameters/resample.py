@@ -1,4 +1,4 @@
-"""Signals cut at times of strides, each piece on the same number of points."""
+"""Resampling of signal segments between times, each to the same number of points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
 
     Parameters
     ----------
-    bounds : (pieces, 2) s. A piece that touches NaN in a signal is NaN throughout.
+    bounds : (pieces, 2) s. A piece that contains NaN in a signal is completely NaN.
     """
     return list(resample_in_turn(signals, t_s, bounds, points))
 
@@ -25,7 +25,7 @@ def resample(signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int
 def resample_in_turn(
     signals: Iterable[Floats], t_s: Floats, bounds: Floats, points: int = 101
 ) -> Iterator[Floats]:
-    """The same, one signal after the other: the curves of an hour are as large as its signals."""
+    """The same as an iterator over signals: the curves of an hour are as large as its signals."""
     place = (bounds - t_s[0]) * ((len(t_s) - 1) / (t_s[-1] - t_s[0]))
     nowhere = ~np.isfinite(place).all(axis=1)
     place[nowhere] = 0.0
@@ -45,7 +45,7 @@ def resample_in_turn(
 
 
 def _interpolate(signals: Floats, low: NDArray[np.int64], share: Floats) -> Floats:
-    """Signals (k, n) a share of the way from a sample to the next, as (k, pieces, points)."""
+    """Signals (k, n) interpolated by a fraction between samples, as (k, pieces, points)."""
     here, rows = signals.take(low, axis=1), signals[:, 1:].take(low, axis=1)
     # in place: ten minutes of all angles are a million points
     rows -= here
@@ -57,17 +57,21 @@ def _interpolate(signals: Floats, low: NDArray[np.int64], share: Floats) -> Floa
 
 @lru_cache(maxsize=8)
 def _shares(points: int) -> Floats:
-    """So many (points,) from 0 to 1; every stride asks for the same ones."""
+    """Evenly spaced values (points,) from 0 to 1; cached, since every stride uses the same ones."""
     return np.linspace(0.0, 1.0, points)
 
 
 def first_crossing(pieces: Floats) -> Floats:
-    """Where the rows of (m, points) first pass zero upwards, as a share 0 to 1 of the piece; NaN if never."""
+    """First upward zero crossing of the rows of (m, points), as a fraction 0 to 1 of the piece; NaN if
+    none.
+    """
     return _crossing(pieces, last=False)
 
 
 def last_crossing(pieces: Floats) -> Floats:
-    """Where the rows of (m, points) last pass zero upwards, as a share 0 to 1 of the piece; NaN if never."""
+    """Last upward zero crossing of the rows of (m, points), as a fraction 0 to 1 of the piece; NaN if
+    none.
+    """
     return _crossing(pieces, last=True)
 
 

@@ -1,4 +1,4 @@
-"""What a parameter is: a number with its spread, or no number with its reason."""
+"""Result types of parameters: a number with its spread, or no number with its reason."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ class Parameter:
     Parameters
     ----------
     name : field term with its unit, e.g. "stride_time_s" (docs/reference/parameters.md).
-    side : "left", "right" or None for the whole take.
-    n : strides behind the number. mean, sd : None with a `reason` when undefined (sd also when n < 2).
+    side : "left", "right" or None for the whole recording. n : number of strides. mean, sd : None with a
+        `reason` if undefined (sd also if n < 2).
     reason : None, or a stable code: "no_strides", "opposite_foot_missing", "no_terminal_contact" …
-    cv_pct : coefficient of variation; None below 10 strides, for angles and where a value is not positive.
-    ci_low, ci_high : 95 % confidence interval of the mean over the strides, None when n < 2.
-    note : what to know about the number: "few_strides" below 30; None.
-    uncertainty : the value ± this holds the truth with 95 %, from its strides and its measurement
-        (core/parameters/uncertainty.py); None where the measurement's part is not known, and of one stride.
-    u_own, u_common : standard uncertainties of the measurement that strides do not average out: of this side
-        in this take, and shared by both sides and every take.
-    estimated : of an angle that no two sensors measure: a model of the leg gives it.
+    cv_pct : coefficient of variation; None below 10 strides, for angles and if any value is not positive.
+    ci_low, ci_high : 95 % confidence interval of the mean over the strides, None if n < 2. note : remark on
+        the number: "few_strides" below 30; None.
+    uncertainty : half width of the 95 % interval from strides and measurement
+        (core/parameters/uncertainty.py); None if the measurement uncertainty is unknown, and for a single
+        stride.
+    u_own, u_common : standard uncertainties of the measurement that do not average out over strides: of this
+        side in this recording, and common to both sides and all recordings.
+    estimated : based on an angle that is not measured by two sensors but estimated by a leg model.
     """
 
     name: str
@@ -52,8 +53,8 @@ class MeanCurve:
 
     Parameters
     ----------
-    mean, sd : (101,) rad; None without strides, sd also with fewer than two. NaN where most strides rest on
-        the bound of a leg model. n : strides behind them.
+    mean, sd : (101,) rad; None without strides, sd also with fewer than two. NaN where most strides are at
+        the bound of a leg model. n : number of strides.
     """
 
     mean: Floats | None
@@ -63,15 +64,15 @@ class MeanCurve:
 
 @dataclass(frozen=True, eq=False)
 class CycleCurves:
-    """Angles over the gait cycle, used and unused strides alike.
+    """Angles over the gait cycle, for counted and excluded strides alike.
 
     Parameters
     ----------
     curves : variable without side, e.g. "knee_flexion" → side → (strides, 101) rad, 0 to 100 % of cycle;
-        NaN rows where the stride has gaps. Row i belongs to `stride_index[side][i]` of the stride list.
-    used : side → (strides,) True where the stride counts.
-    foot_off_pct : side → (strides,) terminal contact in % of cycle, NaN if not found.
-    why : variable → side → reason of an angle that was withheld, or impossible in some stride.
+        NaN rows for strides with gaps. Row i belongs to `stride_index[side][i]` of the stride list.
+    used : side → (strides,) True if the stride is counted.
+    foot_off_pct : side → (strides,) terminal contact in % of cycle, NaN if not detected. why : variable →
+        side → reason for an angle that was suppressed, or impossible in some stride.
     bounds : variable → side → rad, as `JointAngles.bounds`. zero : as `JointAngles.zero`.
     """
 
@@ -85,5 +86,5 @@ class CycleCurves:
 
     @cached_property
     def means(self) -> dict[tuple[str, Side], MeanCurve]:
-        """Mean curves that somebody has asked `mean_curve` for, by variable and side."""
+        """Cache of `mean_curve`, by variable and side."""
         return {}

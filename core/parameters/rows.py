@@ -1,4 +1,4 @@
-"""Figures of single strides: numbers, or the reasons why there are none, by name; and what sums them up."""
+"""Values of single strides: numbers, or the reasons why there are none, by name; and their summaries."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ Codes = NDArray[np.object_]
 
 @dataclass(frozen=True, eq=False)
 class Figure:
-    """One figure of every stride of a list.
+    """Values of one parameter for every stride of a list.
 
     Parameters
     ----------
-    values : (strides,) NaN where there is none. reasons : why there is none, "" where there is one.
+    values : (strides,) NaN if missing. reasons : for missing values, else "".
     """
 
     values: Floats
@@ -48,13 +48,13 @@ NO_REASON = np.array("", np.object_)
 
 
 def tell_figure(values: Floats, reasons: Codes | str) -> Figure:
-    """The values (strides,) that are finite, and for the others these reasons, one each or one for all."""
+    """Finite values (strides,), with reasons for the others, one each or one for all."""
     known = np.isfinite(values)
     return Figure(np.where(known, values, np.nan), np.where(known, NO_REASON, reasons))
 
 
 def as_column(values: Floats) -> Column:
-    """A figure (strides,) as a column: None where it is NaN."""
+    """Values (strides,) as a column: None for NaN."""
     return tuple(list_known(values))
 
 
@@ -64,14 +64,14 @@ def figure_columns(figures: Figures) -> dict[str, Column]:
 
 
 def read_row(figures: Figures, place: int) -> dict[str, Value]:
-    """Figures of one stride, by its place in the list."""
+    """Values of one stride, by its index in the list."""
     return {name: x.reasons[place] or float(x.values[place]) for name, x in figures.items()}
 
 
 def figure_parameter(
     name: str, side: Side | None, figure: Figure, chosen: NDArray[np.bool_ | np.intp]
 ) -> Parameter:
-    """Parameter over chosen strides; without a value the most frequent reason, "no_strides" without any."""
+    """Parameter over selected strides; without a value the most frequent reason, "no_strides" without any."""
     values = figure.values[chosen]
     values = values[~np.isnan(values)]
     if len(values):
@@ -83,6 +83,6 @@ def figure_parameter(
 
 
 def side_parameters(strides: Strides, figures: Figures) -> tuple[Parameter, ...]:
-    """Parameters of both sides over the counted strides; `figures` are of all strides of the list."""
+    """Parameters of both sides over the counted strides; `figures` contain all strides of the list."""
     used = strides.columns.used
     return tuple(figure_parameter(name, side, x, used[side]) for side in SIDES for name, x in figures.items())

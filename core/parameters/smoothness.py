@@ -1,9 +1,9 @@
 """Smoothness of the trunk over a stride: the spectral arc length of its acceleration.
 
 SPARC (Balasubramanian et al. 2015, J NeuroEng Rehabil 12:112): minus the length of the curve of the
-normalised amplitude spectrum up to the last frequency, 10 Hz at most, at which it exceeds 5 %; of an
-accelerometer the signal is | ‖f‖ − g | (its table 3). More sub-movements make more peaks and a longer curve:
-nearer to 0 is smoother. It has no norm here.
+normalised amplitude spectrum up to the last frequency, 10 Hz at most, at which it exceeds 5 %; for an
+accelerometer the signal is | ‖f‖ − g | (its table 3). More sub-movements cause more peaks and a longer curve:
+closer to 0 is smoother. There is no norm for it here.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
 
     Parameters
     ----------
-    strides : first and last contact of each, s. trunk : pelvis → (n, 3) acceleration free of gravity,
-        forward, left, up, on the uniform axis `t_s` (n,).
+    strides : first and last contact of each, s. trunk : pelvis → (n, 3) gravity-free acceleration, forward,
+        left, up, on the uniform axis `t_s` (n,).
 
     Returns
     -------
-    without a value a reason: "no_pelvis_sensor", "no_strides", "no_forward", "gap".
+    Parameter; without a value a reason: "no_pelvis_sensor", "no_strides", "no_forward", "gap".
     """
     if "pelvis" not in trunk:
         return summarise_values(NAME, None, [], "", "no_pelvis_sensor")
@@ -63,9 +63,9 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
 
 
 def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
-    """SPARC (m,) of signals (m, points) that are not negative, their samples `step_s` (m,) apart.
+    """SPARC (m,) of non-negative signals (m, points) with samples `step_s` (m,) apart.
 
-    NaN where the signal is 0 throughout, not finite or too coarse for a spectrum.
+    NaN if the signal is 0 throughout, not finite or sampled too coarsely for a spectrum.
     """
     n = PADDING * pieces.shape[1]
     kept = int(np.ceil(LIMIT_HZ * n * float(np.max(step_s, initial=0.0)))) + 2
@@ -77,7 +77,7 @@ def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
 
 
 def _measure_arcs(pieces: Floats, step_s: Floats, n: int, kept: int) -> Floats:
-    """The same of some signals: padded to n points, so many frequencies looked at."""
+    """SPARC of signals padded to n points, using this many frequencies."""
     spectrum = np.abs(np.fft.rfft(pieces, n, axis=1)[:, :kept])
     dc = spectrum[:, :1]
     shape = spectrum / np.where(dc > 0.0, dc, np.nan)

@@ -1,9 +1,9 @@
 """Paths of the feet and strides → distances: lengths, width, speed, swing paths.
 
-A foot's place is where its ankle is at its flat (flats.py). Stride length and speed are between the two
-flats of one foot, in the same window (docs/science/spatial.md); a step is between the flats of the two feet
-and belongs to the foot that lands. The direction of progression of a stride is from its first flat to its
-second.
+The position of a foot is that of its ankle at foot-flat (flats.py). Stride length and speed are between two
+foot-flats of one foot, over the same window (docs/science/spatial.md); a step is between foot-flats of the
+two feet and belongs to the foot that lands. The direction of progression of a stride is from its first
+foot-flat to its second.
 """
 
 from __future__ import annotations
@@ -58,11 +58,11 @@ CLEARANCES: Final = ("max_heel_clearance_m", "min_toe_clearance_m")
 
 @dataclass(frozen=True)
 class Surface:
-    """What was walked on.
+    """Walking surface.
 
     Parameters
     ----------
-    belt_speed_mps : of a treadmill, None when nobody entered it or there is none.
+    belt_speed_mps : of a treadmill, None if not entered or overground.
     """
 
     protocol: Protocol = "walk"
@@ -73,25 +73,25 @@ GROUND: Final = Surface()
 
 
 def surface_of(recording: UniformRecording) -> Surface:
-    """What was walked on, as the recording says."""
+    """Walking surface according to the recording."""
     return Surface(recording.protocol, recording.belt_speed_mps)
 
 
 def measure_distances(
     strides: Strides, feet: FootTracks | None, surface: Surface = GROUND, flats: Flats | None = None
 ) -> Figures:
-    """Figures by name of every stride of the list, counted or not, in its order.
+    """Distances by name for every stride of the list, counted or not, in its order.
 
     Parameters
     ----------
-    feet : None without a foot sensor. flats : of `find_flats`, where somebody has them already.
+    feet : None without a foot sensor. flats : from `find_flats`, if already computed.
 
     Returns
     -------
-    values in m, m/s and degrees: circumduction outward positive, width positive with the feet on their own
-    sides, toe-out external positive at the flat that begins the stride, from its direction while standing for
-    calibration. On a treadmill only length and speed, from the belt's speed. Width needs to know how far
-    apart the feet stood: without, calibration takes the legs to be vertical, which is wrong by up to a
+    Values in m, m/s and degrees: circumduction outward positive, width positive with the feet on their own
+    sides, toe-out external positive at the foot-flat that begins the stride, relative to its direction in
+    standing for calibration. On a treadmill only length and speed, from the belt speed. Width requires the
+    distance of the feet in standing: without it, calibration assumes vertical legs, which is wrong by up to a
     decimetre.
     """
     if surface.protocol == "treadmill":
@@ -120,9 +120,9 @@ def measure_distances(
 def in_place(
     strides: Strides, feet: FootTracks | None, surface: Surface = GROUND, flats: Flats | None = None
 ) -> NDArray[np.intp]:
-    """Places in the list of strides that end where they began: weight was shifted, nobody walked on.
+    """Indices of strides in place, which end where they began: a shift of weight without walking.
 
-    Empty on a treadmill, where every stride does. Arguments as of `measure_distances`.
+    Empty on a treadmill, where this applies to every stride. Arguments as in `measure_distances`.
     """
     short = np.zeros(len(strides.strides), np.bool_)
     if feet is None or surface.protocol == "treadmill":
@@ -139,12 +139,12 @@ def in_place(
 def summarise_distances(
     strides: Strides, feet: FootTracks | None, figures: Figures, surface: Surface = GROUND
 ) -> tuple[Parameter, ...]:
-    """Distances over the counted strides: speed and way of the take, the others by side.
+    """Distances over the counted strides: speed and total distance of the recording, the others by side.
 
     Returns
     -------
-    without a value a reason: "no_strides", "estimator_bad" (the feet are withheld), "path_bad" (this
-    foot is) or the most frequent one of the strides.
+    Parameters; without a value a reason: "no_strides", "estimator_bad" (both feet are suppressed), "path_bad"
+    (this foot is) or the most frequent one of the strides.
     """
     speed, *others = NAMES
     return (
@@ -155,7 +155,9 @@ def summarise_distances(
 
 
 def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
-    """Way of the take: from rest to rest of a foot, turns and short steps too; mean of the feet."""
+    """Total distance of the recording: from rest to rest of a foot, including turns and short steps; mean
+    of the feet.
+    """
     name = "total_distance_m"
     if surface.protocol == "treadmill":
         return summarise_values(name, None, [], "m", "treadmill")
@@ -190,8 +192,9 @@ def _on_belt(strides: Strides, belt_mps: float | None) -> Figures:
 
 @dataclass(frozen=True, eq=False)
 class _Foot:
-    """What is looked up of a foot for every stride: the sole's heights, and how often the foot was lost, or
-    packets of its swing, before a sample."""
+    """Lookup data of a foot for all strides: heights of the sole, and cumulative counts of lost samples
+    and of lost packets in swing.
+    """
 
     side: Side
     heights: SoleHeights | None
@@ -207,25 +210,27 @@ def _lay_foot(feet: FootTracks, side: Side) -> _Foot:
 
 
 def _count_before(mask: Bools) -> NDArray[np.int32]:
-    """How many (n + 1,) of a mask (n,) are true before each sample, and in all."""
+    """Cumulative count (n + 1,) of true values of a mask (n,) before each sample, and in total."""
     count = np.zeros(len(mask) + 1, np.int32)
     np.cumsum(mask, out=count[1:])
     return count
 
 
 def _way(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp]) -> tuple[Floats, Floats, Floats]:
-    """Way on the floor between two samples each of a path (n, 3): x, y and length (m,), m."""
+    """Horizontal displacement between two samples each of a path (n, 3): x, y and length (m,), m."""
     x, y = (p[last, :2] - p[first, :2]).T
     return x, y, _map(hypot, x, y)
 
 
 def _map(function: Callable[[float, float], float], x: Floats, y: Floats) -> Floats:
-    """A function of two numbers for each (m,): numpy's own are not those of the libraries to the bit."""
+    """Apply a function of two numbers elementwise (m,): numpy's versions are not bit-identical to those of
+    the math library.
+    """
     return np.array(list(map(function, x.tolist(), y.tolist())), np.float64)
 
 
 def _explain(flats: Flats, feet: FootTracks, foot: _Foot) -> Codes:
-    """Why strides of a foot with these flats have no distance, "" where they have."""
+    """Why strides of a foot with these foot-flats have no distance, "" if they have one."""
     known = (flats.first >= 0) & (flats.last >= 0)
     first, last = np.where(known, flats.first, 0), np.where(known, flats.last, 0)
     short = _way(feet.p[foot.side], first, last)[2] < STEP_M
@@ -243,7 +248,7 @@ def _explain(flats: Flats, feet: FootTracks, foot: _Foot) -> Codes:
 def _measure_side(
     strides: Strides, own: NDArray[np.intp], flats: Flats, feet: FootTracks, foot: _Foot
 ) -> Figures:
-    """Figures of some strides of one foot that have a length; `flats` are theirs."""
+    """Values of some strides of one foot with a known length; `flats` are theirs."""
     of, side, first, last = strides.columns, foot.side, flats.first, flats.last
     x, y, length = _way(feet.p[side], first, last)
     along = np.stack((x / length, y / length), axis=1)
@@ -263,7 +268,9 @@ def _measure_side(
 
 
 def _furthest(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp], outward: Floats) -> Floats:
-    """How far (m,) a path goes in a direction (m, 2) of its own from the first of two samples each, m."""
+    """Maximum displacement (m,) of a path in an individual direction (m, 2) from the first of two samples
+    each, m.
+    """
     far = np.empty(len(first))
     for length in np.unique(last - first).tolist():
         same = np.flatnonzero(last - first == length)
@@ -276,7 +283,7 @@ def _furthest(p: Floats, first: NDArray[np.intp], last: NDArray[np.intp], outwar
 def _clearances(
     tc_s: Floats, end_s: Floats, feet: FootTracks, heights: SoleHeights | None, flats: Flats
 ) -> Figures:
-    """Of the sole between the two flats."""
+    """Clearances of the sole between the two foot-flats."""
     n = len(tc_s)
     if heights is None:
         return {name: _untold(n, "no_shoe_geometry") for name in CLEARANCES}
@@ -300,7 +307,7 @@ def _clearances(
 def _steps(
     landed_s: Floats, feet: FootTracks, side: Side, flats: Flats, along: Floats, outward: Floats
 ) -> Figures:
-    """Steps that end the strides: from the other foot's flat to this one's."""
+    """Steps at the end of the strides: from the other foot's foot-flat to this one's."""
     other = OTHER[side]
     why = np.full(len(landed_s), "", object)
     why[flats.opposite < 0] = "no_foot_flat"

@@ -1,8 +1,8 @@
 """Parts of the stance: loading, foot flat, push-off, from the pitch of the foot.
 
 The foot is flat around its quietest moment for as long as its pitch stays within `FLAT_RAD` of that moment's
-(IC to foot flat, flat, heel-off to TC, in % of stance). Fitted to nothing: the limit is
-the geometry of a centimetre.
+(IC to foot flat, flat, heel-off to TC, in % of stance). Not fitted to data: the limit corresponds to the
+geometry of a centimetre.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ QUIET: Final = 10
 
 @dataclass(frozen=True, eq=False)
 class Stances:
-    """When each foot was flat, one entry per stride of the list.
+    """Foot-flat phases, one entry per stride of the list.
 
     Parameters
     ----------
-    flat_s, heel_off_s : (strides,) s, NaN where there is no such moment. parts : of the stance in %, or why
-        not: "no_foot_sensor", "no_terminal_contact", "gap", "no_foot_flat".
+    flat_s, heel_off_s : (strides,) s, NaN if missing. parts : of the stance in %, or the reason:
+        "no_foot_sensor", "no_terminal_contact", "gap", "no_foot_flat".
     """
 
     flat_s: Floats
@@ -48,7 +48,7 @@ class Stances:
 
 
 def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
-    """Foot → pitch (n,) in rad, toes up positive, 0 while standing; NaN where its sensor was lost."""
+    """Foot → pitch (n,) in rad, toes up positive, 0 in standing; NaN where its sensor was lost."""
     found: dict[Segment, Floats] = {}
     for foot in FOOT.values():
         if foot in orientations.q:
@@ -60,11 +60,11 @@ def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
 
 
 def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) -> Stances:
-    """Find when each foot is flat in every stride.
+    """Determine the foot-flat phase of every stride.
 
     Parameters
     ----------
-    pitch : of `foot_pitches`, on `t_s` (n,).
+    pitch : from `foot_pitches`, on `t_s` (n,).
     """
     start, off = strides.columns.start_s, strides.columns.tc_s
     part = np.full((len(start), 2), np.nan)
@@ -83,7 +83,9 @@ def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) ->
 
 
 def _flat_part(pitch: Floats) -> Floats:
-    """Start and end (m, 2) of the flat in pieces (m, 101), as shares of the stance; NaN without one."""
+    """Start and end (m, 2) of the flat phase in pieces (m, 101), as fractions of the stance; NaN without
+    one.
+    """
     m, points = pitch.shape
     known = np.asarray(np.isfinite(pitch).all(axis=1), np.bool_)
     pitch = np.where(known[:, None], pitch, 0.0)
@@ -107,6 +109,6 @@ def _flat_part(pitch: Floats) -> Floats:
 
 
 def _share(outside: Floats, inside: Floats) -> Floats:
-    """Where zero lies on the way from a value ≥ 0 to one < 0."""
+    """Fraction of the way from a value ≥ 0 to one < 0 at which zero is crossed."""
     way = outside - inside
     return np.asarray(np.clip(outside / np.where(way > 0.0, way, 1.0), 0.0, 1.0))

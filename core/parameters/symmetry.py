@@ -1,8 +1,7 @@
-"""Left against right, or the affected side against the other: indices with their sign, or the difference.
+"""Comparison of left and right, or of the affected and the other side: signed indices, or the difference.
 
-The sides are stored; what compares them is derived when it is shown. Every index says which side it puts
-first, and none is 0 or absolute for want of something better (docs/science/phases-and-regularity.md,
-"Symmetry").
+Only the sides are stored; comparisons are derived for display. Every index states which side comes first, and
+none is set to 0 or made absolute as a fallback (docs/science/phases-and-regularity.md, "Symmetry").
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ LEAST: Final[Mapping[str, float]] = {unit: 5.0 * known for unit, known in KNOWN_
 
 @dataclass(frozen=True)
 class Symmetry:
-    """One parameter of the two sides compared.
+    """Comparison of one parameter between the two sides.
 
     Parameters
     ----------
-    first : the side that stands first: the affected one, else left. reference : "affected/unaffected" or
+    first : the side that comes first: the affected one, else left. reference : "affected/unaffected" or
         "left/right".
-    difference : first − other, in `unit`. low, high : its 95 % interval, of strides and measurement, None
-        where the spread of a side is not known. ratio : first / other.
-    index_pct : 100 (first − other) / mean of both (Robinson 1987), positive when the first is larger.
-    angle_pct : (45° − atan(first / other)) / 90° · 100 (Zifchock 2008), as published: NEGATIVE when the
-        first is larger.
+    difference : first − other, in `unit`. low, high : its 95 % interval, from strides and measurement, None
+        if the spread of a side is unknown. ratio : first / other.
+    index_pct : 100 (first − other) / mean of both (Robinson 1987), positive if the first is larger.
+    angle_pct : (45° − atan(first / other)) / 90° · 100 (Zifchock 2008), as published: NEGATIVE if the first
+        is larger.
     reason : why there is no ratio: "angle" (its zero is a convention), "near_zero" (a side too small to
         divide by, or negative); else None.
     """
@@ -66,13 +65,15 @@ class Symmetry:
 
     @property
     def clear(self) -> bool:
-        """Which side is larger can be said: the interval leaves out 0, and values are known that well."""
+        """Whether the sides differ significantly: the interval excludes 0, and the difference exceeds the
+        resolution.
+        """
         told = self.low is not None and self.high is not None and self.low * self.high > 0.0
         return told and abs(self.difference) >= KNOWN_TO.get(self.unit, 0.0)
 
 
 def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
-    """Compare the sides of every parameter that has a value of enough strides on both, in the order given.
+    """Compare the sides for every parameter with a value of enough strides on both, in the order given.
 
     Parameters
     ----------
@@ -114,15 +115,15 @@ def angle_pct(first: float, other: float) -> float:
 
 
 def phase_coordination(strides: Strides) -> Parameter:
-    """`pci_pct`: how near to half a stride the other foot lands, and how steadily (Plotnik et al. 2007).
+    """`pci_pct`: accuracy and consistency of the phase of the other foot's contact (Plotnik et al. 2007).
 
     φ = 360° · (time of the other foot's contact in the stride / stride time), over the counted strides of the
     foot with the longer swing; PCI = CV(φ) + 100 mean|φ − 180°| / 180°, so that 0 is perfect.
 
     Returns
     -------
-    without a value a reason: "no_strides", "opposite_foot_missing", "no_terminal_contact", "few_strides"
-    (below 10, like every variation).
+    Parameter; without a value a reason: "no_strides", "opposite_foot_missing", "no_terminal_contact",
+    "few_strides" (below 10, as for every measure of variability).
     """
     name = "pci_pct"
     of = strides.columns

@@ -1,4 +1,4 @@
-"""All parameters of a take, and of every stride of its list: each measured once."""
+"""All parameters of a recording, and of every stride of its list: each measured once."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class TakeFigures:
-    """Figures of a take.
+    """Parameters of a recording.
 
     Parameters
     ----------
@@ -55,14 +55,14 @@ def take_figures(
     trunk: Mapping[Segment, Floats] | None = None,
     flats: Flats | None = None,
 ) -> TakeFigures:
-    """Temporal, spatial, parts of stance and swing, angles over the cycle, regularity of the trunk.
+    """Temporal and spatial parameters, parts of stance and swing, angles over the cycle, trunk regularity.
 
     Parameters
     ----------
-    angles : None = the take was not analysed so far: times only.
-    orientations : of the feet, for their pitch; None leaves it out. feet : None = there are no distances.
+    angles : None = not reached by the analysis: times only.
+    orientations : of the feet, for their pitch; None omits it. feet : None = no distances.
     trunk : pelvis → (n, 3) acceleration in the walking frame, on the axis of the angles.
-    flats : of these strides, where somebody has them already.
+    flats : of these strides, if already computed.
     """
     columns = per_stride(strides)
     times = (*summarise_times(strides), phase_coordination(strides))

@@ -1,8 +1,8 @@
-"""Several takes of one visit as one number: their mean, each take counting once.
+"""Combination of several recordings of one visit: the mean of their values, each recording counting once.
 
-A take with more strides is no better witness of how somebody walks that day than one with fewer: between
-takes people change more than the mean of many strides is uncertain. What every take measures anew averages
-out as 1/√k; what all takes share (`u_common`) stays.
+A recording with more strides is not more representative of the day: people vary more between recordings than
+the uncertainty of the mean over many strides. Errors independent between recordings average out as 1/√k;
+errors common to all of them (`u_common`) remain.
 """
 
 from __future__ import annotations
@@ -16,22 +16,21 @@ from sagittal.core.parameters.result import Parameter
 
 
 def join_takes(takes: Sequence[Parameter]) -> Parameter:
-    """Mean of a parameter over the takes that have a value; of one take that take itself.
+    """Mean of a parameter over the recordings that have a value; for one recording its parameter unchanged.
 
     Parameters
     ----------
-    takes : the same parameter of the same side in each take, at least one.
+    takes : the same parameter of the same side in each recording, at least one.
 
     Returns
     -------
-    Parameter with n = strides of all takes; sd and cv are of no single take and None. The interval of the
-    mean takes the strides of the takes as independent; None where a take has none. No value with the first
-    take's reason where no take has one.
+    Parameter with n = strides of all recordings; sd and cv are None because they are defined for a single
+    recording. The interval of the mean assumes independent strides of the recordings; None if a recording has
+    none. Without any value the reason of the first recording.
 
     Raises
     ------
-    ParameterError
-        "no_takes", "unlike_takes" (other parameters or sides).
+    ParameterError "no_takes", "unlike_takes" (different parameters or sides).
     """
     if not takes:
         raise ParameterError("no_takes", "No take to take the mean of.")
@@ -66,5 +65,5 @@ def join_takes(takes: Sequence[Parameter]) -> Parameter:
 
 
 def _mean_of_independent(parts: Sequence[float]) -> float:
-    """Uncertainty of a mean whose parts are uncertain independently of each other."""
+    """Uncertainty of a mean of values with independent uncertainties."""
     return sqrt(sum(x * x for x in parts)) / len(parts)

@@ -22,7 +22,7 @@ from sagittal.core.parameters.variability import summarise_values
 
 
 def stride_values(stride: Stride) -> dict[str, float | None]:
-    """Temporal parameters of one stride by name, s or % of the stride; None where undefined."""
+    """Temporal parameters of one stride by name, s or % of the stride; None if undefined."""
     return {name: list_known(x)[0] for name, x in temporal_values(Strides((stride,))).items()}
 
 
@@ -32,7 +32,7 @@ def per_stride(strides: Strides) -> dict[str, Column]:
 
 
 def temporal_values(strides: Strides) -> dict[str, Floats]:
-    """Temporal parameters (strides,) by name, s or % of the stride; NaN where undefined."""
+    """Temporal parameters (strides,) by name, s or % of the stride; NaN if undefined."""
     of = strides.columns
     start, tc, end, opposite_tc, opposite_ic = (
         of.start_s, of.tc_s, of.end_s, of.opposite_tc_s, of.opposite_ic_s
@@ -57,7 +57,7 @@ def temporal_values(strides: Strides) -> dict[str, Floats]:
 
 
 def possible_values(found: Mapping[str, Floats]) -> dict[str, Floats]:
-    """The same times (strides,), NaN also where no person can have the value."""
+    """The same times (strides,), with NaN also for physiologically impossible values."""
     possible = {}
     for name, x in found.items():
         low, high = CATALOGUE[name].plausible
@@ -70,7 +70,7 @@ def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
 
     Returns
     -------
-    mean and sd (n − 1) over strides; without a value a reason: "no_strides", "no_terminal_contact",
+    Mean and sd (n − 1) over strides; without a value a reason: "no_strides", "no_terminal_contact",
     "opposite_foot_missing", "no_double_support" (a flight phase).
     """
     parameters: list[Parameter] = []
@@ -98,7 +98,7 @@ def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
 
 
 def explain_missing(name: str, used: Sequence[Stride]) -> str:
-    """Why a parameter has no value over these strides of a side."""
+    """Reason why a parameter has no value over these strides of a side."""
     if not used:
         return "no_strides"
     if name.startswith(("stance", "swing")):
@@ -111,7 +111,7 @@ def explain_missing(name: str, used: Sequence[Stride]) -> str:
 
 
 def cadence(step: Parameter) -> Parameter:
-    """60 / mean step time of both feet; its sd to first order, 60 sd / mean², and its interval inverted."""
+    """60 / mean step time of both feet; its sd to first order, 60 sd / mean², and the inverted interval."""
     named = replace(step, name="cadence_spm", unit="steps/min")
     if step.mean is None:
         return named

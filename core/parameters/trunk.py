@@ -1,12 +1,13 @@
-"""How regular the trunk moves: harmonic ratio and regularity of its acceleration in straight walking.
+"""Regularity of trunk movement: harmonic ratio and autocorrelation of its acceleration in straight walking.
 
 Harmonic ratio of a stride: the acceleration over one stride as a Fourier series of the stride's frequency;
 the sum of the amplitudes of the first ten even harmonics over that of the first ten odd ones, for left-right
-the reverse (Gage 1964; Smidt, Arora and Johnston 1971; Bellanca et al. 2013). Two equal steps make the even
-ones; the ratio tells how alike the two steps of a stride are. It has no norm here.
+the reverse (Gage 1964; Smidt, Arora and Johnston 1971; Bellanca et al. 2013). Two equal steps contribute only
+to the even ones; the ratio measures the similarity of the two steps of a stride. There is no norm for it
+here.
 
 Regularity: the unbiased autocorrelation at the time of one step and of one stride, where its peak is
-(Moe-Nilssen and Helbostad 2004); 1 = every step, or stride, like the one before.
+(Moe-Nilssen and Helbostad 2004); 1 = every step, or stride, equals the previous one.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ NAMES: Final = (
 
 
 def choose_foot(strides: Strides) -> tuple[Window, ...]:
-    """Counted strides of the foot that has more of them: those of both overlap, one foot's tell all once."""
+    """Counted strides of the foot with more of them: strides of both feet overlap, those of one foot cover
+    everything once.
+    """
     own = max((strides.columns.used[side] for side in SIDES), key=len)
     return tuple(zip(strides.columns.start_s[own].tolist(), strides.columns.end_s[own].tolist(), strict=True))
 
@@ -64,14 +67,14 @@ def trunk_regularity(
     Parameters
     ----------
     strides : first and last contact of each, s, in order.
-    trunk : pelvis → (n, 3) acceleration free of gravity, forward, left, up, on the uniform axis `t_s` (n,);
-        NaN where lost, a column of NaN where an axis is not known.
+    trunk : pelvis → (n, 3) gravity-free acceleration, forward, left, up, on the uniform axis `t_s` (n,); NaN
+        where lost, a column of NaN for an unknown axis.
 
     Returns
     -------
-    the ratio with its spread over strides, the regularity of all walking together; without a value a reason:
-    "no_pelvis_sensor", "no_strides", "no_forward" (an axis that is nowhere known), "gap", "no_run" (never
-    three strides in a row).
+    The ratio with its spread over strides, the regularity over all walking; without a value a reason:
+    "no_pelvis_sensor", "no_strides", "no_forward" (an unknown axis), "gap", "no_run" (no three consecutive
+    strides).
     """
     if "pelvis" not in trunk:
         return tuple(summarise_values(name, None, [], "", "no_pelvis_sensor") for name in NAMES)
@@ -82,7 +85,9 @@ def trunk_regularity(
 
 
 def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
-    """Ratios (strides,) by axis of accelerations (3, strides, points) over whole strides, end left out."""
+    """Ratios (strides,) by axis of accelerations (3, strides, points) over whole strides, end point
+    excluded.
+    """
     amplitude = np.abs(np.fft.rfft(pieces, axis=-1)[..., 1 : HARMONICS + 1])
     odd, even = amplitude[..., ::2].sum(axis=-1), amplitude[..., 1::2].sum(axis=-1)
     found = {}
@@ -93,7 +98,7 @@ def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
 
 
 def _why(acceleration: Floats, axis: str) -> str:
-    """Why an axis has no values: lost, or never known."""
+    """Why an axis has no values: lost, or unknown."""
     return "gap" if np.isfinite(acceleration[:, AXES[axis]]).any() else "no_forward"
 
 
@@ -123,7 +128,7 @@ def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Ite
 
 
 def _autocorrelation(pieces: Sequence[Floats], lags: np.ndarray) -> Floats:
-    """Unbiased autocorrelation (lags,) of pieces of one signal, each about the mean of all."""
+    """Unbiased autocorrelation (lags,) of pieces of one signal, relative to their common mean."""
     mean = np.concatenate(pieces).mean()
     centred = [a - mean for a in pieces]
     # a signal that never changes is not alike anything
@@ -137,7 +142,7 @@ def _autocorrelation(pieces: Sequence[Floats], lags: np.ndarray) -> Floats:
 
 
 def _runs(own: Sequence[Window]) -> Iterator[list[Window]]:
-    """Strides of one foot that follow each other without a break."""
+    """Consecutive strides of one foot without a break."""
     run: list[Window] = []
     for s in own:
         if run and s[0] != run[-1][1]:

@@ -1,8 +1,8 @@
-"""Value ± uncertainty: what strides leave open, and what the measurement does.
+"""Value ± uncertainty: contributions of the strides and of the measurement.
 
-docs/science/uncertainty.md. The error of a single stride gets less over many, that of a foot, a calibration
-or a definition does not. It is kept in three parts, because they do not count everywhere alike: what both
-sides and every take share falls out of a difference of sides or visits, and stands in a value.
+docs/science/uncertainty.md. The error of a single stride averages out over many, that of a foot, a
+calibration or a definition does not. Three parts are kept because they apply differently: errors common to
+both sides and all recordings cancel in a difference of sides or visits, but not in a value.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ it is (validation/report.md, "L7S: parameters of whole analyses")."""
 
 @dataclass(frozen=True)
 class ContactErrors:
-    """What the moments of contact are known to, standard uncertainties in s.
+    """Standard uncertainties of contact times in s.
 
     Parameters
     ----------
-    contact, foot_off : shared by both feet and every take: how the rule departs from the definition, and the
-        references among themselves. foot : of one foot in one take. random : of a single event.
+    contact, foot_off : common to both feet and all recordings: deviation of the rule from the definition, and
+        of the references from each other. foot : of one foot in one recording. random : of a single event.
     """
 
     contact: float
@@ -80,16 +80,16 @@ def state_uncertainty(
     goniometer: bool = False,
     feet_lag_s: float = 0.0,
 ) -> tuple[Parameter, ...]:
-    """The parameters with what they are known to; those without a value or a declared error as they are.
+    """The parameters with their uncertainty; unchanged without a value or a declared error.
 
-    One stride alone has the measurement's parts and no `uncertainty`: how strides differ is not known.
+    A single stride has the measurement contributions and no `uncertainty`: the spread of strides is unknown.
 
     Parameters
     ----------
-    parameters : of one take. events : that they were measured on, for what its contacts are known to.
-    estimated : angles, with their side, that no two sensors measure.
-    goniometer : a standing angle was added to the levels.
-    feet_lag_s : what one foot's clock may be late by, standard, where nothing between the feet shows it.
+    parameters : of one recording. events : used to measure them, for the uncertainty of contacts. estimated :
+        angles, with their side, that are not measured by two sensors. goniometer : a standing angle was added
+        to the levels. feet_lag_s : standard uncertainty of the clock offset of one foot, if not determined by
+        a link between the feet.
     """
     contacts = _contact_errors(events)
     strides = {p.side: p.mean for p in parameters if p.name == "stride_time_s"}
@@ -100,14 +100,14 @@ def state_uncertainty(
 
 
 def mark_estimated(parameters: Sequence[Parameter], angles: Collection[str]) -> tuple[Parameter, ...]:
-    """The parameters, those read from one of these angles marked as estimated: the other side is its own."""
+    """The parameters, with those derived from these angles of the same side marked as estimated."""
     return tuple(
         replace(p, estimated=True) if is_estimated(p.name, p.side, angles) else p for p in parameters
     )
 
 
 def is_estimated(name: str, side: Side | None, angles: Collection[str]) -> bool:
-    """Whether a parameter is read from one of these angles; those of the pelvis have no side."""
+    """Whether a parameter is derived from one of these angles; those of the pelvis have no side."""
     variable = _variable(name)
     if variable is None:
         return False
@@ -115,13 +115,15 @@ def is_estimated(name: str, side: Side | None, angles: Collection[str]) -> bool:
 
 
 def _variable(name: str) -> str | None:
-    """The curve that a parameter is read from."""
+    """The curve from which a parameter is derived."""
     entry = CATALOGUE.get(name)
     return None if entry is None or entry.curve is None else entry.curve.variable
 
 
 def difference_half_width(strides: float, *own: float | None) -> float:
-    """95 % half width of a difference of two values, from that of their strides and their own errors."""
+    """95 % half width of a difference of two values, from that of their strides and their measurement
+    errors.
+    """
     return hypot(strides, NORMAL_95 * hypot(*(u or 0.0 for u in own)))
 
 
@@ -162,7 +164,7 @@ def _stated(
 
 
 def _per_second(p: Parameter, strides: Mapping[Side | None, float | None]) -> float | None:
-    """What a second is in the parameter's unit; None for a share of a stride of unknown length."""
+    """Conversion of a second to the parameter's unit; None for a percentage of a stride of unknown length."""
     if p.unit != "%":
         return 1.0
     stride = strides.get(p.side)
@@ -172,7 +174,7 @@ def _per_second(p: Parameter, strides: Mapping[Side | None, float | None]) -> fl
 def _of_contacts(
     w: ContactWeights, contacts: Mapping[Side, ContactErrors], side: Side | None, feet_lag_s: float
 ) -> tuple[float, float, float]:
-    """Common, own and random error of a time in s, from those of the contacts that it lies between."""
+    """Common, own and random error of a time in s, from those of its contacts."""
     one: Side = side or "left"
     a, b = contacts[one], contacts[OTHER[one]]
     # the same rule finds a kind of event on both feet: their shared errors add with their signs
@@ -188,9 +190,9 @@ def _of_contacts(
 
 
 def _contact_errors(events: GaitEvents | None) -> dict[Side, ContactErrors]:
-    """Of the events of each foot: by what they state themselves, else of the pitch rule.
+    """Errors for the events of each foot: as stated by the events, else those of the pitch rule.
 
-    An event set by a person counts as `TYPICAL_S`: people who mark the same signal differ by as much.
+    A manual event counts as `TYPICAL_S`: people who mark the same signal differ by as much.
     """
     known: dict[tuple[Side, EventKind], list[float]] = {}
     for e in () if events is None else events.events:
@@ -201,7 +203,7 @@ def _contact_errors(events: GaitEvents | None) -> dict[Side, ContactErrors]:
 
 
 def _foot_errors(contacts: Sequence[float] | None, leavings: Sequence[float] | None) -> ContactErrors:
-    """Of a foot, from what its contacts and foot-offs state in s."""
+    """Errors of a foot, from the uncertainties of its contacts and foot-offs in s."""
     if not contacts or not leavings:
         return PITCH_RULE
     ic, tc = (float(np.sqrt(np.mean(np.square(x)))) / TYPICAL_S for x in (contacts, leavings))

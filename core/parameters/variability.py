@@ -1,7 +1,7 @@
 """Values of strides → mean, spread, coefficient of variation and confidence interval of a parameter.
 
-The interval is Student's for the mean of independent values. Strides of one walk follow each other slowly
-up and down, so that it is the least uncertainty there is, not all of it.
+The interval is Student's for the mean of independent values. Strides of one walk vary slowly, so that it is a
+lower limit of the uncertainty.
 """
 
 from __future__ import annotations
@@ -36,14 +36,16 @@ TOO_FEW: Final = "too_few_strides"
 
 
 def has_enough_values(p: Parameter) -> bool:
-    """Enough strides, steps or repetitions to be held against another side or visit, a norm or a limit."""
+    """Whether there are enough strides, steps or repetitions for a comparison with another side or visit,
+    a norm or a limit.
+    """
     return p.n >= COMPARED or name_counted(p.name) not in {"strides", "steps", "repetitions"}
 
 
 def summarise_values(
     name: str, side: Side | None, values: Sequence[float] | Floats, unit: str, reason: str | None = None
 ) -> Parameter:
-    """One parameter from its values; without values the reason stands instead."""
+    """One parameter from its values; without values the reason instead."""
     if not len(values):
         return Parameter(name, side, 0, None, None, unit, reason or "no_strides")
     x = np.asarray(values, np.float64)
@@ -64,9 +66,9 @@ def summarise_values(
 
 
 def mean_and_sd(x: Floats) -> tuple[float, float | None]:
-    """Mean of values (n ≥ 1,) and their standard deviation (n − 1), None of one.
+    """Mean of values (n ≥ 1,) and their standard deviation (n − 1), None for a single value.
 
-    As `x.mean()` and `x.std(ddof=1)`, to the bit, without what those spend on axes and masks.
+    Bit-identical to `x.mean()` and `x.std(ddof=1)`, without their overhead for axes and masks.
     """
     n = len(x)
     mean = np.add.reduce(x) / n
@@ -77,8 +79,8 @@ def mean_and_sd(x: Floats) -> tuple[float, float | None]:
 def cv_pct(values: Sequence[float] | Floats, unit: str) -> float | None:
     """Coefficient of variation 100 sd / mean, sd with n − 1.
 
-    None below `CV_STRIDES` values, for angles, and for values that are not all positive: a quantity whose
-    zero is a convention, or which passes through it, has no ratio.
+    None below `CV_STRIDES` values, for angles, and unless all values are positive: a ratio is meaningless for
+    a quantity with a conventional zero or with zero crossings.
     """
     x = np.asarray(values, np.float64)
     return _vary(x, *mean_and_sd(x), unit) if len(x) else None
@@ -96,7 +98,7 @@ class Spread:
 
     Parameters
     ----------
-    own : standard uncertainty of the measurement of this side that strides do not average out.
+    own : standard uncertainty of the measurement of this side that does not average out over strides.
     """
 
     mean: float
@@ -106,9 +108,11 @@ class Spread:
 
 
 def difference_interval(a: Spread, b: Spread) -> tuple[float, float] | None:
-    """95 % interval of a − b, None without spreads (Welch 1947, Biometrika 34:28; freedom rounded down).
+    """95 % interval of a − b, None without spreads (Welch 1947, Biometrika 34:28; degrees of freedom rounded
+    down).
 
-    What the measurement of each side leaves open is added as a root of squares: strides do not lessen it.
+    The measurement uncertainty of each side is added in quadrature: it does not decrease with the number of
+    strides.
     """
     if a.sd is None or b.sd is None:
         return None
@@ -123,7 +127,7 @@ def difference_interval(a: Spread, b: Spread) -> tuple[float, float] | None:
 
 
 def differ(a: Spread, b: Spread) -> bool:
-    """The strides say which of two sides is larger: the interval of the difference leaves out 0."""
+    """Whether the sides differ: the interval of the difference excludes 0."""
     ends = difference_interval(a, b)
     return ends is not None and ends[0] * ends[1] > 0.0
 

@@ -1,4 +1,6 @@
-"""Bouts, turns and steps of a trunk sensor → parameters of the take (docs/reference/parameters.md)."""
+"""Walking bouts, turns and steps of a trunk sensor → parameters of the recording
+(docs/reference/parameters.md).
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ from sagittal.core.signals.rest import Window
 
 
 def bout_parameters(bouts: Sequence[Bout]) -> tuple[Parameter, ...]:
-    """How often and how long somebody walked; the minutes are those of all bouts together."""
+    """Number and total duration of walking bouts."""
     n = len(bouts)
     minutes = sum(b.duration_s for b in bouts) / 60.0
     return (
@@ -48,7 +50,7 @@ def turn_parameters(turns: Sequence[Turn]) -> tuple[Parameter, ...]:
 
 
 def step_strides(steps: Steps) -> tuple[Window, ...]:
-    """Strides of one foot between a trunk sensor's steps: two steady steps each, none with a break inside."""
+    """Strides of one foot from the steps of a trunk sensor: two steady steps each, without a break."""
     strides: list[Window] = []
     for bout in steps.bouts:
         contacts = [s.time_s for s in steps.steps if bout.first_s <= s.time_s <= bout.end_s]
@@ -60,10 +62,10 @@ def step_strides(steps: Steps) -> tuple[Window, ...]:
 
 
 def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
-    """Cadence, step time and number of steps of a trunk sensor, both feet together.
+    """Cadence, step time and number of steps from a trunk sensor, both feet together.
 
-    A step belongs to the whole take: which foot landed is told for whole walks or not at all, and a step's
-    two ends have errors of different feet.
+    Steps belong to the whole recording: sides are determined for whole walks or not at all, and the two ends
+    of a step have errors of different feet.
     """
     found = steps.step_times_s
     times = [t for t in found if not is_impossible("step_time_s", t)]

@@ -1,7 +1,7 @@
 """The whole chain: Recording → Analysis, in named stages.
 
-`config` has the parameters of every stage, `analysis` what the stages give, `stages` the stages themselves,
-`recipes` their order. The same code serves the command line, the worker and the tests.
+`config` has the parameters of every stage, `analysis` their results, `stages` the stages themselves,
+`recipes` their order. The same code is used by the command line, the worker and the tests.
 """
 
 from sagittal.core.pipeline.analysis import TakeAnalysis

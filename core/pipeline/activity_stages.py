@@ -1,4 +1,4 @@
-"""The stages of a recording of daily life: one sensor of the trunk, read block by block."""
+"""Stages of a daily-life recording: one trunk sensor, read block by block."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from sagittal.core.activity.monitor import Progress, monitor_activity
 from sagittal.core.activity.result import ActivityResult
 from sagittal.core.errors import SignalError
 from sagittal.core.frames import Segment
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -25,7 +26,7 @@ best [our choice]."""
 
 
 def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
-    """The sensor of daily life; a single sensor that nobody assigned is taken to be on the chest.
+    """The sensor of a daily-life recording; a single unassigned sensor is assumed to be on the chest.
 
     Raises
     ------
@@ -40,20 +41,23 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
         return "chest", next(iter(there.values()))
     raise SignalError(
         "no_trunk_sensor",
-        "Daily life needs a sensor on the chest or the lower back. Say in the mapping which sensor was worn "
-        f"there (sensors found: {', '.join(there)}).",
+        Message(
+            "Daily life needs a sensor on the chest or the lower back. Say in the mapping which "
+            "sensor was worn there (sensors found: {there}).",
+            there=", ".join(there),
+        ),
     )
 
 
 def watch_activity(analysis: TakeAnalysis, config: PipelineConfig, tell: Progress) -> TakeAnalysis:
-    """What the person did from hour to hour; `tell` hears how far it is."""
+    """Daily-life activities; `tell` reports progress."""
     segment, stream = find_trunk_stream(analysis.source)
     found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity, tell)
     return replace(analysis, activity=found)
 
 
 def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """How much of the recording says something; an error of its signals has stopped it before."""
+    """Quality from the fraction of the recording with known posture; signal errors have stopped it before."""
     found = analysis.activity
     if found is None:
         level: Level = "poor"
@@ -67,7 +71,7 @@ def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def share_known(found: ActivityResult) -> float:
-    """Share of the worn time in which the posture is known, 0 to 1."""
+    """Fraction of the wear time with known posture, 0 to 1."""
     worn = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap"))
     known = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap", "unknown"))
     return known / worn if worn > 0.0 else 0.0
@@ -75,14 +79,16 @@ def share_known(found: ActivityResult) -> float:
 
 def list_doubts(found: ActivityResult) -> tuple[str, ...]:
     """Why the level is not good, as sentences."""
-    doubts = []
+    doubts: list[str] = []
     total = max(found.duration_s, 1e-9)
     unknown = 1.0 - share_known(found)
     if unknown > 0.1:
-        doubts.append(f"The posture is not known in {100 * unknown:.0f} % of the time worn.")
+        doubts.append(
+            Message("The posture is not known in {unknown:.0f} % of the time worn.", unknown=100 * unknown)
+        )
     lost = 60.0 * found.minutes("gap") / total
     if lost > 0.1:
-        doubts.append(f"{100 * lost:.0f} % of the time nothing was recorded.")
+        doubts.append(Message("{lost:.0f} % of the time nothing was recorded.", lost=100 * lost))
     if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
         doubts.append("Without walking it is not certain which way is up.")
     return tuple(doubts)

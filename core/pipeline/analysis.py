@@ -1,4 +1,4 @@
-"""What the stages give: one record, one field per stage, and what is read from it."""
+"""Results of the stages: one record, one field per stage, and derived properties."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from sagittal.core.events.turns import Turn
 from sagittal.core.frames import Side
 from sagittal.core.functional_tests.result import FunctionalTest
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.parameters.measure import MeasuredGait, Tracks
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.pipeline.config import PipelineConfig
@@ -39,24 +40,25 @@ Result = TypeVar("Result")
 
 
 def require_stage(result: Result | None, stage: str) -> Result:
-    """The result of a stage that another one needs.
+    """The result of a stage required by another one.
 
     Raises
     ------
     ParameterError : `stage_not_reached`.
     """
     if result is None:
-        raise ParameterError("stage_not_reached", f"The stage '{stage}' gave no result.")
+        raise ParameterError("stage_not_reached", Message("The stage '{stage}' gave no result.", stage=stage))
     return result
 
 
 @dataclass(frozen=True, eq=False)
 class DetectedContacts:
-    """What the stage `events` gives.
+    """Result of the stage `events`.
 
     Parameters
     ----------
-    turns : of the body. steps : of a trunk sensor, None where the feet's contacts are known or none is worn.
+    turns : of the body. steps : of a trunk sensor, None if foot contacts are known or there is no trunk
+        sensor.
     """
 
     events: GaitEvents
@@ -66,35 +68,32 @@ class DetectedContacts:
 
 @dataclass(frozen=True, eq=False)
 class TakeAnalysis:
-    """Everything one take gave; what was not reached is None and `problem` says why.
+    """Complete result of one recording; results not reached are None, with the reason in `problem`.
 
-    A stage sets its own field and none of another stage, so that the chain can go on from any stage
+    Each stage sets only its own fields, so that the chain can be resumed from any stage
     (`sagittal.core.pipeline.resume`). Users read the properties.
 
     Parameters
     ----------
     source : as read from the files.
-    uniform : stage timeline; samples of sensors that do not measure are not valid.
-    setup : stages agreement and calibration; what is proposed where the set-up is wrong, None = nothing is
-        seen.
-    agreed : stage agreement; holds the recording with what could be repaired.
+    uniform : stage timeline; samples of sensors that do not measure are invalid.
+    setup : stages agreement and calibration; proposed correction of the set-up, None = no errors detected.
+    agreed : stage agreement; contains the corrected recording.
     report : stage quality.
-    calibrated : stage calibration, with the mountings that each sensor shows on its own.
-    calibration_score : of stage calibration, and anew of stage mounting with the mountings as they are used.
-    fused : stage orientation, with those mountings.
+    calibrated : stage calibration, with the alignment estimated for each sensor independently.
+    calibration_score : of stage calibration, replaced in stage mounting by that of the final alignment.
+        fused : stage orientation, with the alignment of stage calibration.
     contacts : stage events.
     mounted : stage mounting; None also for a single trunk sensor.
     posed : stage poses.
     angles : stage angles.
-    tracks : stage parameters, what strides and parameters are measured on, and after an edit are measured on
-        again.
+    tracks : stage parameters, input data for measuring strides and parameters, also after an edit.
     measured : stage parameters.
-    activity : stage activity of daily life, which has no common axis and none of the stages above but
-        quality.
-    legs : stage poses of squats, side → what its chain makes of it. squats : stage parameters of these, one
-        for each of the legs.
+    activity : stage activity of daily life, which has no common axis and of the stages above only quality.
+    legs : stage poses of squats, side → result of its chain. squats : stage parameters of squats, one for
+        each leg.
     functional : stage test of a functional test.
-    problem : the error that stopped the chain, None when every stage ran. stopped_at : that stage's name.
+    problem : the error that stopped the chain, None if every stage ran. stopped_at : that stage's name.
     """
 
     source: Recording
@@ -122,33 +121,35 @@ class TakeAnalysis:
 
     @property
     def recording(self) -> UniformRecording:
-        """The take on its axis, late sensors shifted; every analysis that `analyse` returns has it."""
+        """The recording on its uniform axis, with late sensors shifted; present in every result of
+        `analyse`.
+        """
         return require_stage(self.uniform, "timeline") if self.agreed is None else self.agreed.recording
 
     @property
     def quality(self) -> QualityReport:
-        """The quality report; every analysis that `analyse` returns has it."""
+        """The quality report; present in every result of `analyse`."""
         return require_stage(self.report, "quality")
 
     @property
     def calibration(self) -> Calibration | None:
-        """Mountings as they were used in the end: with the legs apart and the forward axes of the joints."""
+        """The final alignment, with leg inclination and joint-based forward axes."""
         last = self.calibrated if self.mounted is None else self.mounted.calibrated
         return None if last is None else last.calibration
 
     @property
     def orientations(self) -> Orientations | None:
-        """As the angles take them: refined where the pose estimator does so."""
+        """As used for the angles: refined if the pose estimator does so."""
         return self.fused if self.posed is None else self.posed.orientations
 
     @property
     def poses(self) -> Poses | None:
-        """Poses of the segments, None before they are estimated."""
+        """Poses of the segments, None before they have been estimated."""
         return None if self.posed is None else self.posed.poses
 
     @property
     def feet(self) -> FootTracks | None:
-        """Paths of the feet that distances are measured on; None without a foot sensor."""
+        """Paths of the feet used for distances; None without a foot sensor."""
         return None if self.posed is None else self.posed.feet
 
     @property
@@ -163,7 +164,7 @@ class TakeAnalysis:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters, those of a functional test first; empty when nothing was reached."""
+        """All parameters, those of a functional test first; empty if not reached."""
         if self.squats is not None:
             return tuple(p for of_leg in self.squats for p in of_leg.parameters)
         if self.activity is not None:
@@ -173,7 +174,7 @@ class TakeAnalysis:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """All notices of all stages, each once."""
+        """Notices of all stages without duplicates."""
         detected = None if self.contacts is None else self.contacts.events
         speaking = (
             self.source, None if self.uniform is None else self.recording, self.report, self.calibration,
@@ -187,7 +188,7 @@ class TakeAnalysis:
 
     @property
     def provenance(self) -> Mapping[str, object]:
-        """sha256 of the input by file, digest of the parameters, version of the code."""
+        """SHA-256 of every input file, digest of the parameters, version of the code."""
         return {
             "input_sha256": dict(self.source.sha256),
             "parameters_sha256": self.config.digest,

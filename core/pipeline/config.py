@@ -22,6 +22,7 @@ from sagittal.core.events.lumbar import LumbarParams
 from sagittal.core.events.turns import TurnParams
 from sagittal.core.functional_tests.params import FunctionalTestParams
 from sagittal.core.fusion.mahony import MahonyParams
+from sagittal.core.message import Message
 from sagittal.core.quality import QualityParams
 from sagittal.core.quality.stuck import StuckParams
 from sagittal.core.setup import SetupParams
@@ -65,16 +66,16 @@ REMOVED: Final = frozenset(
 
 @dataclass(frozen=True)
 class PipelineConfig:
-    """Parameters of every stage; its hash is part of each result's provenance.
+    """Parameters of every stage; the hash is part of each result's provenance.
 
-    No stage takes a parameter that is not in here (tests/core/pipeline/test_config.py).
+    All stage parameters are contained here (tests/core/pipeline/test_config.py).
 
     Parameters
     ----------
-    events : of the foot-pitch rule, by which contacts are found. contacts : of their refinement. ways :
-        of swings by their way.
+    events : of the foot-pitch rule, which detects contacts. contacts : of their refinement. ways :
+        of swings detected from displacement.
     detector : "foot_contact" has the smallest error (validation/accuracy/test_events_references.py);
-        "foot_pitch" is the published rule, to compare with; the consensus asks the shanks too and is led by
+        "foot_pitch" is the published rule, for comparison; the consensus also uses the shanks and is led by
         "foot_contact".
     bouts : of the feet's contacts; those of a trunk sensor's steps are `lumbar.bouts`.
 
@@ -109,18 +110,22 @@ class PipelineConfig:
         if self.detector not in get_args(Detector):
             raise ParameterError(
                 "unknown_detector",
-                f"Detector '{self.detector}' is not one of {', '.join(get_args(Detector))}.",
+                Message(
+                    "Detector '{detector}' is not one of {join}.",
+                    detector=self.detector,
+                    join=", ".join(get_args(Detector)),
+                ),
             )
 
     @property
     def digest(self) -> str:
-        """sha256 over all parameters; equal parameters give equal digests."""
+        """SHA-256 over all parameters; equal parameters give equal digests."""
         text = json.dumps(self, sort_keys=True, default=_list_fields)
         return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _list_fields(value: object) -> object:
-    """Parameters of a stage by name; what else JSON does not know as text."""
+    """Parameters of a stage by name; types unknown to JSON as text."""
     return vars(value) if dataclasses.is_dataclass(value) else str(value)
 
 
@@ -129,8 +134,8 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
 
     Parameters
     ----------
-    overrides : by stage, {"fusion": {"attitude": {"kp": 0.5}}}; a list for a tuple. What was `REMOVED` is
-        passed over.
+    overrides : by stage, {"fusion": {"attitude": {"kp": 0.5}}}; a list for a tuple. Parameters in `REMOVED`
+        are ignored.
 
     Raises
     ------
@@ -143,7 +148,13 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
             continue
         if name not in names:
             raise ParameterError(
-                "unknown_parameter", f"There is no {path}.{name}; expected one of {', '.join(sorted(names))}."
+                "unknown_parameter",
+                Message(
+                    "There is no {path}.{name}; expected one of {join}.",
+                    path=path,
+                    name=name,
+                    join=", ".join(sorted(names)),
+                ),
             )
         default = getattr(defaults, name)
         if dataclasses.is_dataclass(default) and isinstance(value, Mapping):
@@ -152,7 +163,14 @@ def override_config(defaults: Settings, overrides: Mapping[str, Any], path: str 
             values[name] = tuple(value) if isinstance(default, tuple) else value
         else:
             raise ParameterError(
-                "bad_parameter", f"{path}.{name} is {value!r}, expected the like of {default!r}."
+                "bad_parameter",
+                Message(
+                    "{path}.{name} is {value}, expected the like of {default}.",
+                    path=path,
+                    name=name,
+                    value=repr(value),
+                    default=repr(default),
+                ),
             )
     return dataclasses.replace(defaults, **values)  # type: ignore[type-var]
 

@@ -1,4 +1,4 @@
-"""The stage that measures a functional test (docs/science/timed-tests.md, docs/science/sway.md)."""
+"""The stages that measure a functional test (docs/science/timed-tests.md, docs/science/sway.md)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sagittal.core.quality.stuck import drop_stuck_sensors
 
 
 def measure_trunk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Timed up and go, rises from a chair, or quiet standing: a sensor on the trunk tells."""
+    """Timed up and go, five times sit-to-stand, or quiet standing, from a trunk sensor."""
     working, protocol = drop_stuck_sensors(analysis.recording), analysis.source.protocol
     limits, params = analysis.source.test_limits, config.functional
     if protocol == "tug":
@@ -30,7 +30,7 @@ def measure_trunk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAn
 
 
 def measure_walk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Ten metres or six minutes of walking: the strides tell."""
+    """Ten-metre or six-minute walk test, from the strides."""
     if analysis.measured is None:
         return analysis
     measure = measure_ten_metres if analysis.source.protocol == "walk_10m" else measure_six_minutes

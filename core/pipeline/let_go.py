@@ -1,4 +1,6 @@
-"""What a stage lets go of: an analysis without what no stage behind it reads, so that long takes fit."""
+"""Memory release between stages: an analysis without data not needed by later stages, so that long
+recordings fit.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,7 @@ from sagittal.core.signals.recording import UniformRecording
 
 
 def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No magnetometers: behind quality only a comparison of filters reads them."""
+    """Drop the magnetometers: after quality only the comparison of filters uses them."""
     source, uniform, agreed = analysis.source, analysis.uniform, analysis.agreed
     streams = {d: s.change(mag=None) for d, s in source.streams.items()}
     analysis = replace(analysis, source=replace(source, streams=streams))
@@ -33,8 +35,9 @@ def _without_magnetometers(recording: UniformRecording) -> UniformRecording:
 
 
 def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Of the orientations before mounting only the feet's, which `measure_walk` falls back on; those behind
-    it for the estimator alone, which lets go of what it refines while it runs."""
+    """Of the orientations before mounting keep only those of the feet, the fallback of `measure_walk`;
+    pass those after it only to the estimator, which releases them while refining.
+    """
     fused, mounted = require_stage(analysis.fused, "orientation"), require_stage(analysis.mounted, "mounting")
     fused = replace(fused, q={s: q for s, q in fused.q.items() if s in FOOT.values()})
     passed = replace(mounted.orientations, q=LastReading(mounted.orientations.q))
@@ -42,9 +45,9 @@ def keep_what_poses_read(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
-    """No orientations from before the estimator; a foot that it left out keeps what it had.
+    """Drop the orientations from before the estimator; a foot that it did not refine keeps its own.
 
-    `measure_walk` falls back on the feet's where there are no angles: their stage does not fail.
+    `measure_walk` falls back on those of the feet without angles, whose stage cannot fail.
     """
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
     fused, refined = require_stage(analysis.fused, "orientation"), posed.orientations
@@ -53,8 +56,9 @@ def keep_refined_alone(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
-    """Orientations of feet and trunk alone, of which there are parameters; of a long take the figure as it is
-    written."""
+    """Keep orientations of feet and trunk only, on which parameters are based; for a long recording the
+    poses in the precision of the file.
+    """
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
     kept = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
     orientations, poses = replace(posed.orientations, q=kept), posed.poses

@@ -1,7 +1,7 @@
 """The order of the stages, and the loop that runs them.
 
-A recipe is a tuple of stages. Which one a take goes through is decided by what was done and by the working
-sensors, once the signals were judged; another one for another movement is another tuple here.
+A recipe is a tuple of stages. It is selected by the protocol and by the working sensors, once the signals
+have been judged; other kinds of movement are added as further tuples.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from sagittal.core.errors import Notice, ParameterError, SagittalError
 from sagittal.core.events.lumbar import TRUNK
+from sagittal.core.message import Message
 from sagittal.core.pipeline.activity_stages import ACTIVITY_MONITOR, ACTIVITY_QUALITY
 from sagittal.core.pipeline.analysis import TakeAnalysis
 from sagittal.core.pipeline.config import PipelineConfig
@@ -63,7 +64,7 @@ ACTIVITY: Final = (ACTIVITY_MONITOR, ACTIVITY_QUALITY)
 
 
 def say_nothing(stage: str, share: float) -> None:
-    """Progress that nobody follows."""
+    """Progress callback that does nothing."""
 
 
 def analyse(
@@ -78,17 +79,15 @@ def analyse(
 
     Parameters
     ----------
-    recording : streams with their segments, as sagittal.core.formats reads them.
+    recording : streams with their segments, as read by sagittal.core.formats.
     config : parameters of the stages; None = the defaults.
     progress : called before each stage.
-    version : of the code, kept in the provenance.
-    resumable : False lets go of what only earlier stages read, which `resume` and a comparison of filters
-        would need; results are the same.
+    version : of the code, for the provenance. resumable : False releases data used only by earlier stages,
+        which `resume` and a comparison of filters would need; results are the same.
 
     Raises
     ------
-    SagittalError
-        When not even a common time axis can be made. Later stages never raise: what stops them is
+    SagittalError If not even a common time axis can be constructed. Later stages never raise: their error is
         `TakeAnalysis.problem`.
     """
     begun = [TakeAnalysis(recording, config or PipelineConfig(), version)]
@@ -98,7 +97,7 @@ def analyse(
 
 
 def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
-    """The recipe of the protocol and of the sensors that work; timeline and quality have run."""
+    """The recipe for the protocol and the working sensors; requires timeline and quality."""
     if analysis.source.protocol == "activity":
         return ACTIVITY
     if analysis.source.protocol == "squat":
@@ -113,11 +112,11 @@ def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
 def run_stages(
     analysis: TakeAnalysis, stages: Sequence[PipelineStage], progress: Progress, *, resumable: bool = True
 ) -> TakeAnalysis:
-    """Run stages in order; after a problem only what measures what is there.
+    """Run stages in order; after a problem only those that can use partial results.
 
     Raises
     ------
-    SagittalError of the first stage, without whose result there is nothing to keep.
+    SagittalError of the first stage, without whose result there is nothing to return.
     """
     for i, stage in enumerate(stages):
         if analysis.problem is not None and not stage.runs_after_problem:
@@ -143,7 +142,7 @@ def run_stages(
 
 
 def _tell_within(stage: PipelineStage, end: float, progress: Progress) -> Callable[[float], None]:
-    """Share of a stage's own work → of the whole, which is `end` when the stage is done."""
+    """Convert progress within a stage to overall progress, which is `end` when the stage is done."""
     return lambda own: progress(stage.name, stage.share + own * (end - stage.share))
 
 
@@ -153,34 +152,41 @@ def resume(
     config: PipelineConfig | None = None,
     progress: Progress = say_nothing,
 ) -> TakeAnalysis:
-    """Run an analysis again from one stage on; the results before it are taken as they are.
+    """Run an analysis again from one stage on; earlier results are reused.
 
     Parameters
     ----------
     stage : name of the first stage that runs again.
-    config : other parameters for it and the stages behind it; None = as before.
+    config : new parameters for it and later stages; None = unchanged.
 
     Returns
     -------
-    what `analyse` with that config gives, to the bit.
+    The result of `analyse` with that config, bit for bit.
 
     Raises
     ------
-    ParameterError : `unknown_stage`; `stage_not_reached` when a stage before it gave no result;
-        `earlier_parameters` when the config changes a stage before it.
+    ParameterError : `unknown_stage`; `stage_not_reached` if an earlier stage has no result;
+        `earlier_parameters` if the config changes an earlier stage.
     """
     config = config or analysis.config
     recipe = choose_recipe(analysis)
     names = [s.name for s in recipe]
     if stage not in names:
-        raise ParameterError("unknown_stage", f"No stage '{stage}'; expected one of {', '.join(names)}.")
+        raise ParameterError(
+            "unknown_stage",
+            Message("No stage '{stage}'; expected one of {names}.", stage=stage, names=", ".join(names)),
+        )
     first = names.index(stage)
     before, again = recipe[:first], recipe[first:]
     missing = [s.name for s in before if any(getattr(analysis, name) is None for name in s.results)]
     if missing and not again[0].runs_after_problem:
         raise ParameterError(
             "stage_not_reached",
-            f"The analysis cannot go on at '{stage}': {missing[0]} gave no result. Resume from there.",
+            Message(
+                "The analysis cannot go on at '{stage}': {missing} gave no result. Resume from there.",
+                stage=stage,
+                missing=missing[0],
+            ),
         )
     changed = [
         name for s in before for name in s.reads if getattr(config, name) != getattr(analysis.config, name)
@@ -188,7 +194,11 @@ def resume(
     if changed:
         raise ParameterError(
             "earlier_parameters",
-            f"{', '.join(changed)} belong to stages before '{stage}'. Resume from an earlier one.",
+            Message(
+                "{changed} belong to stages before '{stage}'. Resume from an earlier one.",
+                changed=", ".join(changed),
+                stage=stage,
+            ),
         )
     forgotten: dict[str, Any] = dict.fromkeys(name for s in again for name in s.results)
     if analysis.stopped_at in names[first:]:
@@ -199,7 +209,7 @@ def resume(
 def _run_from(
     analysis: TakeAnalysis, first: int, progress: Progress, *, resumable: bool = True
 ) -> TakeAnalysis:
-    """Run the stages from this place in the recipe on; which recipe it is, the signals' stages decide."""
+    """Run the stages from this position on; the recipe is selected by the first stages."""
     if analysis.source.protocol == "activity":
         analysis = run_stages(analysis, ACTIVITY[first:], progress)
     else:

@@ -1,4 +1,4 @@
-"""The stages of squats, of one leg or of both (docs/science/squat.md)."""
+"""Stages of single-leg squats, of one leg or of both (docs/science/squat.md)."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.calibration.table_top import calibrate_table_top, crop, find_worn_standing
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SUFFIX
+from sagittal.core.message import Message
 from sagittal.core.pipeline.analysis import TakeAnalysis, require_stage
 from sagittal.core.pipeline.config import PipelineConfig
 from sagittal.core.pipeline.stages import PipelineStage
@@ -35,14 +36,17 @@ AGREED: Final = Notice(
 
 NO_HEIGHT: Final = Notice(
     "height_assumed",
-    f"Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip down depends on it, "
-    "the angles hardly.",
+    Message(
+        "Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip "
+        "down depends on it, the angles hardly.",
+        NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
+    ),
     severity="info",
 )
 
 
 def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Mountings by the fixed offset or from the table, biases and zero from standing."""
+    """Alignment by the fixed offset or from the table, biases and zero from standing."""
     working = drop_stuck_sensors(analysis.recording)
     sides, rest = find_squat_sides(working), config.calibration.rest
     if config.squat.mounting == "table_top":
@@ -70,7 +74,7 @@ def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def estimate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Orientations of the legs, each from its foot that stands still, and the figure."""
+    """Orientations of the legs, each from its supporting foot up, and the poses."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     height, stands = analysis.recording.subject.height_m, find_standing_legs(calibrated)
     legs = {
@@ -83,7 +87,7 @@ def estimate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Joint angles of each leg by its own chain, from standing; a leg without sensors is not asked for."""
+    """Joint angles of each leg by its own chain, relative to standing; only for legs with sensors."""
     legs, posed = require_stage(analysis.legs, "poses"), require_stage(analysis.posed, "poses")
     zero = require_stage(analysis.calibrated, "calibration").calibration.zero
     standing = analysis.recording.subject.standing_angles_deg
@@ -103,7 +107,7 @@ def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> Take
 
 
 def measure_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Repetitions of each leg, depth, times, how the knee falls inward."""
+    """Repetitions of each leg with depth, times and knee valgus."""
     legs, angles = require_stage(analysis.legs, "poses"), require_stage(analysis.angles, "angles")
     recording = drop_stuck_sensors(analysis.recording)
     squats = tuple(

@@ -1,7 +1,7 @@
-"""The stages of the chain: each takes what was reached and the parameters, and adds what it gives.
+"""The stages of the chain: each takes the analysis so far and the parameters, and adds its result.
 
-A stage is a pure function (Analysis, PipelineConfig) → Analysis that sets its own field. What it cannot do it
-raises as a SagittalError; recipes.py keeps what was reached before.
+A stage is a pure function (Analysis, PipelineConfig) → Analysis that sets its own field. Failures are raised
+as SagittalError; recipes.py keeps the earlier results.
 """
 
 from __future__ import annotations
@@ -66,12 +66,12 @@ class PipelineStage:
 
     Parameters
     ----------
-    name : as progress and pages tell it. share : of a typical run that lies before it, 0 to 1.
+    name : shown in progress and on pages. share : fraction of a typical run completed before it, 0 to 1.
     run : (Analysis, PipelineConfig) → Analysis with `results` set; raises SagittalError.
-    results : fields of Analysis that it sets. reads : fields of PipelineConfig that it takes.
-    runs_after_problem : also when an earlier stage could not go on; it takes what was reached.
-    tells_share : `run` takes a third argument, a function that it tells the share of its own work, 0 to 1.
-    let_go : an Analysis without what no stage behind this one reads; None = all of it is read.
+    results : fields of Analysis that it sets. reads : fields of PipelineConfig that it uses.
+        runs_after_problem : runs even if an earlier stage failed, on partial results. tells_share : `run`
+        takes a third argument, a callback for its own progress, 0 to 1. let_go : removes data not needed by
+        later stages; None = nothing to remove.
     """
 
     name: str
@@ -85,15 +85,15 @@ class PipelineStage:
 
 
 def lay_on_one_axis(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """All sensors on one time axis; samples of a sensor that does not measure are not valid."""
+    """All sensors on one time axis; samples of a sensor that does not measure are invalid."""
     uniform = timeline.synchronise(analysis.source, config.timeline)
     return replace(analysis, uniform=mark_stuck(uniform, config.stuck))
 
 
 def compare_clocks(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Whether the set-up is right, and what the sensors say about each other; late ones are laid right.
+    """Check the set-up and the consistency of the sensors; late sensors are shifted.
 
-    A set-up that is wrong, and known how, is an error: numbers of it would be wrong.
+    An incorrect set-up with a known correction is an error, since results based on it would be wrong.
     """
     uniform = require_stage(analysis.uniform, "timeline")
     setup = propose_repair(analysis.source, drop_stuck_sensors(uniform), config.setup, config.agreement)
@@ -110,7 +110,7 @@ def compare_clocks(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """The quality report; an error among its notices is the problem of the analysis."""
+    """The quality report; an error among its notices becomes the problem of the analysis."""
     uniform, agreed = analysis.recording, analysis.agreed
     # what a slipped sensor measures is left out, not lost
     uniform = uniform if agreed is None or agreed.whole is None else agreed.whole
@@ -120,7 +120,7 @@ def judge_signals(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 
 
 def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """How each working sensor sits on its segment."""
+    """Sensor-to-segment alignment of each working sensor."""
     working = drop_stuck_sensors(analysis.recording)
     calibrated = calibration.calibrate(working, config.calibration)
     setup = analysis.setup
@@ -136,15 +136,15 @@ def calibrate_sensors(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAna
 
 
 def orient_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Orientation of every segment on its own."""
+    """Orientation of every segment independently."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     return replace(analysis, fused=estimate_orientations(calibrated, config.fusion))
 
 
 def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Contacts of the feet, turns of the body, and steps of the trunk where no contact was found.
+    """Contacts of the feet, turns of the body, and steps of the trunk if there are no contacts.
 
-    Where no sensor could be calibrated, the trunk's steps are left: they need no calibration.
+    If no sensor could be calibrated, steps of the trunk remain possible: they need no calibration.
     """
     fused, uniform = analysis.fused, drop_stuck_sensors(analysis.recording)
     if fused is None:
@@ -166,7 +166,7 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 
 
 def _fall_back_on_trunk(analysis: TakeAnalysis) -> TakeAnalysis:
-    """The analysis with the steps of its trunk sensor, which say what stopped the calibration."""
+    """The analysis with the steps of its trunk sensor, noting what stopped the calibration."""
     contacts, problem = require_stage(analysis.contacts, "events"), analysis.problem
     told = () if problem is None else (replace(problem, severity="warning"),)
     events = replace(contacts.events, notices=(*told, Notice("trunk_alone", TRUNK_ALONE)))
@@ -174,7 +174,7 @@ def _fall_back_on_trunk(analysis: TakeAnalysis) -> TakeAnalysis:
 
 
 def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Steps and turns of a single trunk sensor: they need neither rest nor calibration."""
+    """Steps and turns from a single trunk sensor: they need neither rest nor calibration."""
     uniform = drop_stuck_sensors(analysis.recording)
     steps = detect_steps(uniform, config.lumbar)
     signals = uniform.sensors[steps.source]
@@ -184,7 +184,7 @@ def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAn
 
 
 def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Mountings as standing width and joints show them; everything behind takes these."""
+    """Alignment refined by standing width and joints; used by all later stages."""
     calibrated = require_stage(analysis.calibrated, "calibration")
     mounted = mount_sensors(calibrated, require_stage(analysis.fused, "orientation"), config.poses)
     give_memory_back()
@@ -194,7 +194,7 @@ def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAna
 
 
 def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Poses of the segments and paths of the feet; distances that cannot be stood behind are withheld."""
+    """Poses of the segments and paths of the feet; unreliable distances are suppressed."""
     mounted = require_stage(analysis.mounted, "mounting")
     events, t_s = require_stage(analysis.contacts, "events").events, analysis.recording.t_s
     contacts = {
@@ -204,7 +204,7 @@ def build_figure(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
 
 
 def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Joint angles; those that the estimator cannot stand behind are withheld."""
+    """Joint angles; unreliable ones are suppressed."""
     posed, mounted = require_stage(analysis.posed, "poses"), require_stage(analysis.mounted, "mounting")
     standing = analysis.recording.subject.standing_angles_deg
     calibration = mounted.calibrated.calibration
@@ -218,7 +218,7 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
 
 
 def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Strides and parameters of what was reached; nothing before the contacts are known."""
+    """Strides and parameters from the results so far; none before the contacts are known."""
     fused, contacts, calibrated = analysis.fused, analysis.contacts, analysis.calibration
     if fused is None or contacts is None or calibrated is None:
         steps = measure_trunk(analysis, config)
@@ -251,7 +251,7 @@ def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis
 
 
 def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
-    """Parameters of the steps of a single trunk sensor."""
+    """Parameters from the steps of a single trunk sensor."""
     contacts, uniform = analysis.contacts, analysis.recording
     if contacts is None or contacts.steps is None:
         return analysis
@@ -275,9 +275,9 @@ def measure_trunk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysi
 def _contacts(
     orientations: Orientations, calibrated: CalibratedRecording, config: PipelineConfig
 ) -> GaitEvents:
-    """Contacts of the chosen detector, each with the share of all detectors that saw it.
+    """Contacts of the selected detector, each with the fraction of detectors that found it.
 
-    Without a foot sensor there is no foot-pitch rule: the shanks' detectors agree among themselves.
+    Without a foot sensor there is no foot-pitch rule: the detectors of the shanks form a consensus.
     """
     refined = None
     if config.detector != "foot_pitch":
@@ -290,7 +290,7 @@ def _contacts(
 
 
 def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
-    """When no foot moved; shanks where no foot is worn, else thighs."""
+    """Windows without movement of the feet; of shanks without foot sensors, else thighs."""
     working = drop_stuck_sensors(analysis.recording)
     for level in (FOOT, SHANK, THIGH):
         worn = [s for s in level.values() if s in working.sensors]
@@ -300,7 +300,7 @@ def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
 
 
 def _vertical_acceleration(uniform: UniformRecording, segment: Segment, config: PipelineConfig) -> Floats:
-    """Acceleration (n, 3), upwards alone, of a trunk sensor whose forward nobody knows; NaN = not known."""
+    """Vertical acceleration as (n, 3) of a trunk sensor with unknown forward axis; NaN = unknown."""
     signals = uniform.sensors[segment]
     vertical, _ = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
     upwards = np.full((len(vertical), 3), np.nan)
@@ -309,7 +309,7 @@ def _vertical_acceleration(uniform: UniformRecording, segment: Segment, config: 
 
 
 def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[Segment, Floats]:
-    """Segment → (n, 3) acceleration free of gravity, forward, left, up, m/s²; NaN = not measured."""
+    """Segment → (n, 3) gravity-free acceleration, forward, left, up, m/s²; NaN = not measured."""
     mounted, posed = analysis.mounted, analysis.posed
     if mounted is None or posed is None:
         return {}

@@ -1,4 +1,4 @@
-"""Can these signals be trusted? What was found (before mapping), how good it is, who wears what."""
+"""Signal quality: inspection of an upload, assessment of sensors, and suggested segment labels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""How good a take is on its common axis: per sensor figures, warnings and one overall level with reasons."""
+"""Quality of a recording on its common axis: values per sensor, warnings and one overall level with
+reasons.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +13,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Segment
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.quality.inspection import measure_losses
 from sagittal.core.quality.signals import magnetic_share, measure_stream, saturation
@@ -39,12 +42,12 @@ class QualityParams:
 
     Parameters
     ----------
-    saturated : share of samples at range. magnetic : |m| off its rest norm, and
-    magnetic_share : of samples that are (docs/science/quality.md, "Range", "Magnetic field").
-    invalid_usable, invalid_poor : share of the take without data of a sensor [our choice].
-    interpolated : share that was filled [our choice].
-    acc_floor, gyr_floor : m/s², rad/s below which nothing can be at its range (±2 g, ±250 °/s: the narrowest
-    that wearables are set to).
+    saturated : fraction of samples at the range limit. magnetic : deviation of |m| from its norm at rest, and
+        magnetic_share : fraction of samples above it (docs/science/quality.md, "Range", "Magnetic field").
+    invalid_usable, invalid_poor : fraction of the recording without data of a sensor [our choice].
+        interpolated : interpolated fraction [our choice].
+    acc_floor, gyr_floor : m/s², rad/s; lower values cannot be range limits (±2 g, ±250 °/s: the narrowest
+        settings of wearables).
     """
 
     saturated: float = 0.001
@@ -60,7 +63,7 @@ class QualityParams:
 
 @dataclass(frozen=True)
 class SensorQuality:
-    """One sensor of the take; percentages 0 to 100, SI units.
+    """One sensor of the recording; percentages 0 to 100, SI units.
 
     Parameters
     ----------
@@ -86,7 +89,7 @@ class SensorQuality:
     magnetic_pct: float | None
 
     def to_json(self) -> dict[str, object]:
-        """Plain values; what is not defined is None."""
+        """Plain values; undefined ones are None."""
         return {
             "segment": self.segment,
             "device_id": self.device_id,
@@ -108,13 +111,12 @@ class SensorQuality:
 
 @dataclass(frozen=True)
 class QualityReport:
-    """What travels with the results.
+    """Quality report attached to the results.
 
     Parameters
     ----------
-    level : good, usable or poor; `reasons` says why it is not good.
-    rest : windows in which all sensors are at rest.
-    notices : an error among them means that numbers would be wrong: the analysis stops.
+    level : good, usable or poor; `reasons` explain why it is not good. rest : windows with all sensors at
+        rest. notices : an error among them means that results would be wrong and stops the analysis.
     """
 
     level: Level
@@ -139,13 +141,13 @@ class QualityReport:
 
 
 def find_shown_level(level: Level, verdict: Verdict | None) -> Level:
-    """The level that people see: the worse of the signals' and the pose estimator's, None = none ran."""
+    """The displayed level: the worse of signal quality and pose estimator health, None = none ran."""
     of_estimator: dict[Verdict | None, Level] = {"warn": "usable", "bad": "poor"}
     return max(level, of_estimator.get(verdict, "good"), key=get_args(Level).index)
 
 
 def concern_paths_alone(bad: Collection[str]) -> bool:
-    """Whether an estimator's findings that are bad, by their names, are all of the path of one foot."""
+    """Whether all bad findings of an estimator, given by name, concern the path of a single foot."""
     return bool(bad) and OF_ONE_FOOT.issuperset(bad)
 
 
@@ -155,13 +157,13 @@ def assess(
     params: QualityParams | None = None,
     working: Collection[Segment] | None = None,
 ) -> QualityReport:
-    """Judge the sensors that are worn on a segment.
+    """Assess the sensors that are mapped to a segment.
 
     Parameters
     ----------
-    recording : as read; units, signs and losses are judged on the original samples.
-    uniform : the same take on its axis.
-    working : segments whose sensor measures (core/quality/stuck.py); rest is asked of those. None = all.
+    recording : as read; units, signs and losses are assessed on the original samples. uniform : the same
+        recording on the uniform axis. working : segments with a working sensor (core/quality/stuck.py), used
+        for rest detection. None = all.
     """
     params = params or QualityParams()
     rest = find_rest_windows(uniform, params.rest, working)
@@ -243,7 +245,7 @@ def _sensor(
 def _measure_rest(
     signals: SensorSignals, uniform: UniformRecording, rest: tuple[Window, ...]
 ) -> tuple[float | None, float | None]:
-    """Length of the specific force and of the mean rate at rest, None without any."""
+    """Norms of the specific force and of the mean rate at rest, None without rest."""
     at_rest = np.zeros(len(uniform.t_s), np.bool_)
     for window in rest:
         at_rest[index_window(window, uniform.rate_hz)] = True
@@ -261,10 +263,13 @@ def _tell_magnetic(segment: Segment, magnetic: float | None, params: QualityPara
     return [
         Notice(
             "magnetic_disturbed",
-            f"The magnetic field at {segment} is off its value at rest in {100 * magnetic:.0f} % of "
-            "the samples "
-            f"(limit {100 * params.magnetic_share:.0f} %). The magnetometer is not used for joint "
-            "angles.",
+            Message(
+                "The magnetic field at {segment} is off its value at rest in {magnetic:.0f} % of the "
+                "samples (limit {magnetic_share:.0f} %). The magnetometer is not used for joint angles.",
+                segment=segment,
+                magnetic=100 * magnetic,
+                magnetic_share=100 * params.magnetic_share,
+            ),
             segment,
             severity="info",
         ),
@@ -285,11 +290,17 @@ def _gap_notice(
     return [
         Notice(
             "gap",
-            f"{segment} has no data in {len(holes)} {plural(len(holes), 'stretch', 'stretches')} of "
-            f"{GAP_S:g} s and more, {100 * invalid:.1f} % of the take; the longest is "
-            f"{(end - start) / uniform.rate_hz:.2f} s. Angles there are "
-            "missing and strides that touch them are left out; heading is relearnt from the straight walking "
-            "after.",
+            Message(
+                f"{{segment}} has no data in {{holes}} {plural(len(holes), 'stretch', 'stretches')} of "
+                "{GAP_S:g} s and more, {invalid:.1f} % of the take; the longest is {value:.2f} s. Angles "
+                "there are missing and strides that touch them are left out; heading is relearnt "
+                "from the straight walking after.",
+                segment=segment,
+                holes=len(holes),
+                GAP_S=GAP_S,
+                invalid=100 * invalid,
+                value=(end - start) / uniform.rate_hz,
+            ),
             segment,
             start / uniform.rate_hz,
             severity="warning" if invalid > params.invalid_usable else "info",
@@ -305,8 +316,17 @@ def _saturated(
     return [
         Notice(
             "saturated",
-            f"The {what} of {segment} stays at {top:.1f} {unit} in {100 * share:.2f} % of the samples (limit "
-            f"{100 * params.saturated:.1f} %): its range is too small for this movement. Set a wider range.",
+            Message(
+                "The {what} of {segment} stays at {top:.1f} {unit} in {share:.2f} % of the samples "
+                "(limit {saturated:.1f} %): its range is too small for this movement. Set a wider "
+                "range.",
+                what=what,
+                segment=segment,
+                top=top,
+                unit=unit,
+                share=100 * share,
+                saturated=100 * params.saturated,
+            ),
             segment,
             severity="warning" if share > params.saturated else "info",
         )
@@ -314,7 +334,7 @@ def _saturated(
 
 
 def _copies(recording: Recording) -> list[Notice]:
-    """A stream under a second id that nobody mapped: said, not analysed."""
+    """Notice on a stream with a second, unmapped id, which is not analysed."""
     worn = {d for d, s in recording.segments.items() if s is not None}
     by_digest: dict[str, list[str]] = {}
     for device, stream in recording.streams.items():
@@ -329,10 +349,18 @@ def _copies(recording: Recording) -> list[Notice]:
         found.append(
             Notice(
                 "duplicate_stream",
-                f"Sensors “{ids}” hold identical samples (a copy under another id); none of them is analysed."
+                Message(
+                    "Sensors “{ids}” hold identical samples (a copy under another id); none of them is "
+                    "analysed.",
+                    ids=ids,
+                )
                 if device_id is None
-                else f"Sensors “{ids}” hold identical samples (a copy under another id); only "
-                f"“{device_id}” is analysed.",
+                else Message(
+                    "Sensors “{ids}” hold identical samples (a copy under another id); only “{device_id}” "
+                    "is analysed.",
+                    ids=ids,
+                    device_id=device_id,
+                ),
                 used[0] if used else group[0],
                 severity="info",
             )
@@ -343,14 +371,26 @@ def _copies(recording: Recording) -> list[Notice]:
 def _level(
     sensors: Mapping[Segment, SensorQuality], notices: list[Notice], params: QualityParams
 ) -> tuple[Level, tuple[str, ...]]:
-    """Poor: wrong or missing signals; usable: something to keep in mind; good: nothing."""
+    """Poor: wrong or missing signals; usable: with caveats; good: without."""
     poor = [n.message for n in notices if n.severity == "error"]
     usable = [n.message for n in notices if n.severity == "warning"]
     for s in sensors.values():
         if s.invalid_pct > 100 * params.invalid_poor:
-            poor.append(f"{s.segment} has no data in {s.invalid_pct:.0f} % of the take.")
+            poor.append(
+                Message(
+                    "{segment} has no data in {invalid_pct:.0f} % of the take.",
+                    segment=s.segment,
+                    invalid_pct=s.invalid_pct,
+                )
+            )
         if s.interpolated_pct > 100 * params.interpolated:
-            usable.append(f"{s.interpolated_pct:.1f} % of the samples of {s.segment} are interpolated.")
+            usable.append(
+                Message(
+                    "{interpolated_pct:.1f} % of the samples of {segment} are interpolated.",
+                    interpolated_pct=s.interpolated_pct,
+                    segment=s.segment,
+                )
+            )
     level: Level = "poor" if poor else "usable" if usable else "good"
     return level, tuple(dict.fromkeys([*poor, *usable]))
 

@@ -1,7 +1,7 @@
-"""A device against itself: its newest check beside the earlier ones (docs/science/devices.md, "Limits").
+"""History of a device: its latest check compared with the earlier ones (docs/science/devices.md, "Limits").
 
-Every limit is about what the analysis can bear and what devices do that nothing is wrong with, not about what
-a maker promises: the wearer's own movement is in every figure.
+Limits are based on the tolerance of the analysis and on the behaviour of intact devices, not on the
+manufacturer's specifications: every value includes the wearer's own movement.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ SAME_RATE: Final = 0.05
 
 @dataclass(frozen=True)
 class DeviceFinding:
-    """Something beyond its limit in the newest check.
+    """A limit exceeded in the latest check.
 
     Parameters
     ----------
-    value, limit : rad/s for a bias, a share for a scale, times the usual for noise.
-    since : index of the last earlier check that was within the limit, None for what is told of one alone.
+    value, limit : rad/s for a bias, a fraction for a scale, a multiple of the usual value for noise. since :
+        index of the last earlier check within the limit, None for findings based on a single check.
     """
 
     quantity: Quantity
@@ -62,14 +62,14 @@ class DeviceFinding:
 
 @dataclass(frozen=True, eq=False)
 class DeviceCourse:
-    """What can be said of a device by all its checks.
+    """Assessment of a device from all its checks.
 
     Parameters
     ----------
-    compared : earlier checks the newest was held against; 0 = there is nothing to compare with.
-    newest : index of the newest check in which it could be measured, None where there is none.
-    usual_bias : (3,) median of the earlier biases, rad/s; bias_limit : distance from it that is told.
-    usual_scale : median of the earlier scales in the posture of the newest. None = nothing to compare with.
+    compared : number of earlier checks compared with the latest; 0 = no comparison possible. newest : index
+        of the latest check with a measurement, None without any.
+    usual_bias : (3,) median of the earlier biases, rad/s. bias_limit : reporting limit of the deviation from
+        it. usual_scale : median of the earlier scales in the same posture. None = no comparison possible.
     """
 
     newest: int | None
@@ -81,16 +81,17 @@ class DeviceCourse:
 
 
 def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
-    """Hold the newest check of a device against the median of the earlier ones.
+    """Compare the latest check of a device with the median of the earlier ones.
 
     Parameters
     ----------
-    checks : of one device, oldest first; those without a measurement are passed over.
+    checks : of one device, oldest first; those without a measurement are skipped.
 
     Notes
     -----
-    A median follows a step once half of the checks show it: then the new level is the device's own. A bias
-    has moved beyond `BIAS_MOVED`, twice what the wearer may have turned in both rests, and its own scatter.
+    A median follows a step once half of the checks show it; the new level then counts as normal. The limit
+    for a bias change combines `BIAS_MOVED`, twice the possible rotation of the wearer in both rests, and its
+    own scatter.
     """
     known = [i for i, check in enumerate(checks) if check.reason is None]
     if not known:
@@ -144,7 +145,9 @@ def _louder(
 def _beyond(
     quantity: Quantity, values: Sequence[float], limit: float, earlier: Sequence[int]
 ) -> list[DeviceFinding]:
-    """The last of the values where it is beyond its limit, with the last earlier check that was not."""
+    """Finding for the last of the values if it exceeds its limit, with the last earlier check that did
+    not.
+    """
     if abs(values[-1]) <= limit:
         return []
     within = [i for i, value in zip(earlier, values, strict=False) if abs(value) <= limit]

@@ -1,7 +1,7 @@
-"""How a device itself is: bias of its gyroscope, scale of its accelerometer and noise, from its own rest.
+"""Properties of a device: gyroscope bias, accelerometer scale and noise, measured at rest.
 
-What and why: docs/science/devices.md. The stream is measured as it was recorded, before any resampling, in
-the longest time in which this one sensor is at rest; core/quality/device_course.py compares.
+Definitions and rationale: docs/science/devices.md. Measured on the stream as recorded, before any resampling,
+in the longest rest of this sensor; core/quality/device_course.py compares the checks.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ _SERIAL: Final = re.compile(
 
 @dataclass(frozen=True, eq=False)
 class DeviceCheck:
-    """One device in one take; all None but `device_id` and `rate_hz` where `reason` says why.
+    """One device in one recording; with a `reason` all are None except `device_id` and `rate_hz`.
 
     Parameters
     ----------
-    rest_s : the window that was used, seconds from the stream's first sample.
-    gyro_bias : (3,) rad/s in sensor axes. bias_error : rad/s that the wearer may have turned at in that time.
+    rest_s : the window used, seconds from the stream's first sample.
+    gyro_bias : (3,) rad/s in sensor axes. bias_error : rad/s, possible rotation of the wearer in that time.
     up : (3,) unit vector, vertical in sensor axes. rest_norm : |mean acc|, m/s².
     gyro_noise, acc_noise : densities in rad/s/√Hz and m/s²/√Hz, None below the resolution of the device.
     """
@@ -72,11 +72,13 @@ class DeviceCheck:
 
     @property
     def gravity_scale(self) -> float | None:
-        """|acc| at rest over standard gravity: scale and bias of the axes as they lay, not of each one."""
+        """|acc| at rest relative to standard gravity: combined scale and bias of the axes in that
+        orientation.
+        """
         return None if self.rest_norm is None else self.rest_norm / GRAVITY
 
     def to_json(self) -> dict[str, object]:
-        """Plain values, SI; what is not defined is None."""
+        """Plain values, SI; undefined ones are None."""
         return {
             "device_id": self.device_id,
             "rate_hz": self.rate_hz,
@@ -92,7 +94,7 @@ class DeviceCheck:
 
     @classmethod
     def from_json(cls, said: Mapping[str, Any]) -> Self:
-        """The check that `to_json` wrote."""
+        """Parse a check written by `to_json`."""
         known = {name: said[name] for name in cls.__dataclass_fields__}
         for name in ("gyro_bias", "up"):
             known[name] = None if known[name] is None else np.asarray(known[name], np.float64)
@@ -101,10 +103,11 @@ class DeviceCheck:
 
 
 def is_serial(device_id: str) -> bool:
-    """Whether an id is a device's own, by its form; only such a device is followed and remembered.
+    """Whether an id has the form of a serial number; only such devices are tracked over time.
 
-    A column's name ("pelvis") is borne by another device in the next take. A file's name, which stands in
-    where there is no serial number, may say who walked: digits alone can be a date or a person's number.
+    A column name ("pelvis") belongs to another device in the next recording. A file name, used as a
+    substitute for a missing serial number, may identify the person: digits alone can be a date or a personal
+    number.
     """
     return _SERIAL.fullmatch(device_id) is not None
 
@@ -114,17 +117,18 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
 
     Parameters
     ----------
-    stream : as recorded; rows with a missing value and gaps are left out.
-    params : what counts as rest (core/signals/rest.py); slow turns of the vertical do not.
+    stream : as recorded; rows with a missing value and gaps are excluded. params : criteria for rest
+        (core/signals/rest.py); slow rotations of the vertical are excluded.
 
     Notes
     -----
-    The bias is the mean rate. A wearer who turns adds his own: `bias_error` is the turn of the vertical
-    between the ends of the rest, at least `params.drift` (1°), over its length. Noise is σ/√rate as in the
-    simulator (data sheets give √2 times that), σ² half of the mean square of successive differences (von
-    Neumann 1941, doi:10.1214/aoms/1177731677), which slow movement does not enter; the lower quartile over
-    half seconds, which reads white noise 4 % low. A device that filters reads less: compare it with itself.
-    |acc| at rest says nothing of an axis that lay level: compare rests in the same posture only.
+    The bias is the mean rate, which includes any rotation of the wearer: `bias_error` is the rotation of the
+    vertical between the ends of the rest, at least `params.drift` (1°), over its duration. Noise is σ/√rate
+    as in the simulator (data sheets give √2 times that), σ² half of the mean square of successive differences
+    (von Neumann 1941, doi:10.1214/aoms/1177731677), which is insensitive to slow movement; the lower quartile
+    over half seconds, which underestimates white noise by 4 %. A device with internal filtering gives lower
+    values: compare it only with itself. |acc| at rest carries no information on a horizontal axis: compare
+    rests in the same posture only.
     """
     params = params or RestParams()
     rate = stream.rate_hz
@@ -156,7 +160,7 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
 
 
 def _held(stream: ImuStream) -> SensorSignals:
-    """The stream's samples, missing ones held and not valid, nor those beside a gap in time."""
+    """The stream's samples; missing ones are held and invalid, as are those next to a gap in time."""
     there = [is_complete(stream.held(name)) for name in ("acc", "gyr")]
     good = np.asarray(np.logical_and(*there), np.bool_)
     acc, rates = stream.held("acc"), stream.held("gyr")
@@ -169,7 +173,7 @@ def _held(stream: ImuStream) -> SensorSignals:
 
 
 def _density(x: Floats, rate_hz: float) -> float | None:
-    """Density of the noise of x (n, 3), mean of the axes; None where no sample differs from the next."""
+    """Noise density of x (n, 3), mean of the axes; None if no sample differs from the next."""
     width = max(2, round(PART_S * rate_hz))
     jumps = (np.diff(x, axis=0) ** 2).mean(axis=1)
     parts = [jumps[a : a + width].mean() for a in range(0, max(1, len(jumps) - width + 1), width)]

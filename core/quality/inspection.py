@@ -1,4 +1,4 @@
-"""What we found in an upload, before anybody said which sensor is worn where."""
+"""Inspection of an upload before sensors are assigned to segments."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.frames import Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.signals import measure_signal, measure_stream
 from sagittal.core.quality.suggestion import Suggestion, suggest
 from sagittal.core.quality.suspicion import list_suspicions
@@ -25,11 +26,11 @@ class DeviceFacts:
     Parameters
     ----------
     samples : rows with a complete acceleration. lost_pct : missing between first and last, % of samples.
-    longest_gap_s : longest stretch without a sample, 0 = none.
-    start_s : first sample relative to the take's first. still_norm : mean |acc| of the quietest second, m/s².
+        longest_gap_s : longest gap, 0 = none. start_s : first sample relative to that of the recording.
+        still_norm : mean |acc| of the quietest second, m/s².
     segment : as declared, None = not used or not declared (see `declared`).
-    suggestion : what the name or the movement suggests.
-    duplicate_of : id of the sensor that holds the same samples, else None.
+    suggestion : segment suggested by name or movement.
+    duplicate_of : id of the sensor with the same samples, else None.
     """
 
     device_id: str
@@ -52,7 +53,7 @@ class DeviceFacts:
     notices: tuple[Notice, ...]
 
     def to_json(self) -> dict[str, object]:
-        """Plain values, rounded to what a reader can use."""
+        """Plain values, rounded for display."""
         return {
             "device_id": self.device_id,
             "source": self.source,
@@ -81,7 +82,7 @@ class DeviceFacts:
 
 @dataclass(frozen=True)
 class Inspection:
-    """A whole upload as found."""
+    """Result of inspecting a whole upload."""
 
     devices: tuple[DeviceFacts, ...]
     duration_s: float
@@ -101,7 +102,7 @@ class Inspection:
 
 
 def describe(recording: Recording) -> Inspection:
-    """Say what an upload holds, sensor by sensor; never raises for a readable recording."""
+    """Describe the content of an upload, sensor by sensor; never raises for a readable recording."""
     first: dict[str, str] = {}
     copies: dict[str, str] = {}
     for device, stream in recording.streams.items():
@@ -142,7 +143,7 @@ LOOKED_AT_S: Final = 600.0
 
 
 def _long_device(s: LongStream, *, declared: bool, segment: Segment | None) -> DeviceFacts:
-    """A sensor whose recording is too long to hold, by its file's head and its first minutes."""
+    """A sensor whose recording is too long for memory, from its file header and its first minutes."""
     blocks = []
     for block in s.open_blocks():
         blocks.append(block)
@@ -176,8 +177,12 @@ def _long_device(s: LongStream, *, declared: bool, segment: Segment | None) -> D
             *s.notices,
             Notice(
                 "read_in_blocks",
-                f"Sensor {s.device_id} recorded {s.duration_s / 3600:.0f} h: it serves the protocol daily "
-                "life. Its figures here are of the first ten minutes.",
+                Message(
+                    "Sensor {device_id} recorded {duration_s:.0f} h: it serves the protocol daily life. "
+                    "Its figures here are of the first ten minutes.",
+                    device_id=s.device_id,
+                    duration_s=s.duration_s / 3600,
+                ),
                 s.device_id,
                 severity="info",
             ),
@@ -200,8 +205,12 @@ def _device(
         notices.append(
             Notice(
                 "duplicate_stream",
-                f"Sensor {s.device_id} holds the same samples as {duplicate_of}: a copy under another id. "
-                "Only the one that is assigned to a segment is analysed.",
+                Message(
+                    "Sensor {device_id} holds the same samples as {duplicate_of}: a copy under another "
+                    "id. Only the one that is assigned to a segment is analysed.",
+                    device_id=s.device_id,
+                    duplicate_of=duplicate_of,
+                ),
                 s.device_id,
             )
         )
@@ -228,7 +237,7 @@ def _device(
 
 
 def measure_losses(s: ImuStream) -> tuple[float, float]:
-    """Share (0 to 1) of samples missing between a stream's first and last, and its longest hole in s."""
+    """Fraction (0 to 1) of samples missing between a stream's first and last, and its longest gap in s."""
     good = is_complete(s.held("acc"))
     if s.gyr is not None:
         good = good & is_complete(s.held("gyr"))

@@ -1,4 +1,4 @@
-"""Sensors of a live take that do not measure: the rule of core/quality/stuck.py on the live axis."""
+"""Sensors of a live recording that do not measure: the rule of core/quality/stuck.py on the live axis."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from sagittal.core.timeline.live import UniformBlock
 
 
 class StuckSensors:
-    """Marks samples of sensors that do not measure, and tells of each such sensor once.
+    """Invalidates samples of sensors that do not measure, and reports each such sensor once.
 
     Parameters
     ----------
-    segments : in the order of the blocks' columns.
+    segments : in the order of the block columns.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class StuckSensors:
         """Segments whose sensor does not measure at the last sample."""
 
     def push(self, block: UniformBlock) -> tuple[UniformBlock, list[Notice]]:
-        """Take the next samples; the same block, invalid where a sensor does not measure, and what is new."""
+        """Process the next samples; returns the block with invalid samples marked, and new notices."""
         found = self._watch.push(block.acc, block.gyr, block.valid)
         if found is None:
             self.now = ()

@@ -1,10 +1,11 @@
-"""Which leg is the left one: the trunk is pushed towards the leg that swings.
+"""Identification of the left leg: the trunk accelerates towards the swinging leg.
 
-While one foot stands, the ground pushes the body away from it, so the pelvis accelerates to the side of the
-swinging leg (Zijlstra & Hof 2003 tell left from right steps by this) and turns that side forward. Both are
-read at the stride frequency, in a walking frame from strapdown integration since the rest before walking.
-Phase against (rate of left leg − rate of right leg), seen at two pelves and five simulated walks: lateral
-acceleration −31 to 27° (0 expected), turning rate to the left 111 to 147°. A side is said only if both agree.
+In single support the ground reaction accelerates the body away from the supporting foot, so the pelvis
+accelerates to the side of the swinging leg (Zijlstra & Hof 2003 use this to distinguish left from right
+steps) and rotates that side forward. Both are evaluated at the stride frequency, in a walking frame from
+strapdown integration since the rest before walking. Phase relative to (rate of left leg − rate of right leg),
+observed in two people and five simulated walks: lateral acceleration −31 to 27° (0 expected), turning rate to
+the left 111 to 147°. A side is reported only if both agree.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class _Walk:
 
 
 def find_left_leg(acc: Floats, gyr: Floats, first: Floats, second: Floats, rate_hz: float) -> int | None:
-    """Say which leg is the left one: 1, 2 or None when it cannot honestly be said.
+    """Number of the left leg: 1, 2, or None if undetermined.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def find_left_leg(acc: Floats, gyr: Floats, first: Floats, second: Floats, rate_
 
 
 def _vote(off: float) -> int | None:
-    """1 when a phase is as expected of a left leg, 2 when opposite, None in between."""
+    """1 if a phase is as expected of a left leg, 2 if opposite, None in between."""
     off = abs(rotation.wrap_angle(off))
     return 1 if off < AGREE else 2 if off > np.pi - AGREE else None
 
@@ -115,9 +116,10 @@ def _walk(acc: Floats, gyr: Floats, legs: Floats, rate_hz: float) -> _Walk | Non
 
 
 def _rest_before(acc: Floats, onset: int, rate_hz: float) -> slice | None:
-    """The latest of the quietest seconds before a step, None when none is quiet.
+    """The latest of the quietest seconds before a step, None without any.
 
-    Not simply the latest quiet one: the body leans before it steps, and a bias taken there turns the world.
+    Not simply the latest quiet one: the body leans before it steps, and a bias estimated there would rotate
+    the world frame.
     """
     width = round(rate_hz)
     starts = list(range(max(0, onset - round(LOOK_BACK_S * rate_hz)), onset - width + 1, max(1, width // 10)))

@@ -1,4 +1,4 @@
-"""Plain facts of one sensor's signals, none of which needs a rest window of the whole take."""
+"""Basic properties of one sensor's signals that do not require a rest window of the whole recording."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ so that the plateau is no longer exact (gaitmap_foot: 6 samples at 155.9 to 157.
 
 @dataclass(frozen=True)
 class Facts:
-    """What a sensor showed.
+    """Signal properties of a sensor.
 
     Parameters
     ----------
-    still : the quietest second is quiet enough to be standing still (whatever the unit).
+    still : the quietest second is quiet enough for standing (in any unit).
     still_norm : mean |acc| in the quietest second, m/s² if the unit is right.
-    still_gyro : least mean |ω| of all seconds in which acc is still: somebody may turn on the spot in the
+    still_gyro : minimum mean |ω| of all seconds with still acc: the person may turn on the spot in the
         quietest one.
     still_slice : samples of that second.
-    median_norm, acc_std : median and standard deviation of |acc| over the take.
+    median_norm, acc_std : median and standard deviation of |acc| over the recording.
     gyro_top : 99.9th percentile of |ω|, rad/s, None without gyroscope.
     """
 
@@ -62,14 +62,14 @@ _known: Final = WeakKeyDictionary[ImuStream, Facts]()
 
 
 def measure_stream(stream: ImuStream) -> Facts:
-    """Measure a sensor as it was read; asked again of the same stream nothing is measured again."""
+    """Measure a sensor as read; results are cached per stream."""
     if stream not in _known:
         _known[stream] = measure_signal(stream.acc, stream.gyr, stream.rate_hz)
     return _known[stream]
 
 
 def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
-    """Measure a sensor; rows with a missing value are left out.
+    """Measure a sensor; rows with a missing value are ignored.
 
     Parameters
     ----------
@@ -110,10 +110,10 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
 
 
 def _without_turns(gyr: Floats, starts: NDArray[np.int64], width: int) -> NDArray[np.int64]:
-    """Those of the windows in which a sensor does not turn: a trunk that turns slowly has a calm force.
+    """The windows without rotation of the sensor: a slowly rotating trunk has a steady force.
 
-    A bias is constant and noise jumps from sample to sample (mean square of differences, von Neumann 1941, by
-    twice the variance: 1); a body's turning rate changes smoothly (0.1 and less).
+    A bias is constant and noise changes from sample to sample (mean square of differences, von Neumann 1941,
+    over twice the variance: 1); the turning rate of a body changes smoothly (0.1 and less).
     """
     total = np.concatenate((np.zeros((1, 3)), np.cumsum(gyr, axis=0)))
     square = np.concatenate(([0.0], np.cumsum(find_squares(gyr))))
@@ -128,7 +128,7 @@ def _without_turns(gyr: Floats, starts: NDArray[np.int64], width: int) -> NDArra
 
 
 def _least(speed: Floats, starts: NDArray[np.int64], width: int) -> float | None:
-    """Least mean speed of the windows that begin at `starts`; missing samples are left out."""
+    """Minimum mean speed of the windows that begin at `starts`; missing samples are ignored."""
     known = np.isfinite(speed)
     total = np.concatenate(([0.0], np.cumsum(np.where(known, speed, 0.0))))
     count = np.concatenate(([0], np.cumsum(known)))
@@ -139,15 +139,15 @@ def _least(speed: Floats, starts: NDArray[np.int64], width: int) -> float | None
 
 
 def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
-    """Share of samples on a plateau at the largest value of an axis, and that value.
+    """Fraction of samples on a plateau at the largest value of an axis, and that value.
 
     Parameters
     ----------
-    x : (n, 3). floor : an axis whose largest value is below this cannot be at its range.
+    x : (n, 3). floor : an axis with a smaller maximum cannot be at its range limit.
 
     Returns
     -------
-    share (0 to 1) of samples with any axis clipped, largest clipped value or None.
+    Fraction (0 to 1) of samples with any axis clipped, largest clipped value or None.
     """
     clipped = np.zeros(len(x), np.bool_)
     value: float | None = None
@@ -169,9 +169,10 @@ def saturation(x: Floats, floor: float) -> tuple[float, float | None]:
 
 
 def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
-    """Share of samples of mag (n, 3) whose |m| differs from its norm at rest by more than `limit` (fraction).
+    """Fraction of samples of mag (n, 3) whose |m| differs from its norm at rest by more than `limit`
+    (fraction).
 
-    None when the magnetometer has no reading at rest. Source: docs/science/quality.md, "Magnetic field".
+    None without a magnetometer reading at rest. Source: docs/science/quality.md, "Magnetic field".
     """
     norm = find_lengths(mag)
     rest = norm[still]

@@ -1,9 +1,9 @@
-"""Channels that do not measure: constant while the sensor moves, long at the end of their range, repeated.
+"""Channels that do not measure: constant while the sensor moves, long at the range limit, repeated.
 
-Nothing in a dead channel is out of range, so whatever is made of it looks plausible. What gives it away is
-exact equality: a moving sensor never measures the same value for a second, whatever its resolution, while one
-at rest may. One rule for a file and a live take: a kernel over blocks of samples of the common axis. Live a
-fault holds from the sample on at which it is known, in a file from where it began.
+No value of a dead channel is out of range, so results based on it look plausible. It is identified by exact
+equality: a moving sensor never measures the same value for a second, whatever its resolution, while one at
+rest may. One rule for files and live recordings: a kernel over blocks of samples of the common axis. Live a
+fault is effective from its detection, in a file from its beginning.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import GRAVITY, Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.signals import RANGES
 from sagittal.core.quality.stuck_kernel import (
     CHANNELS,
@@ -34,24 +35,24 @@ from sagittal.core.signals.rest import find_runs
 
 @dataclass(frozen=True)
 class StuckParams:
-    """Limits; ours, beside the largest value on good recordings (neura_walk, gaitmap_foot, 72 walks of
+    """Limits; our choice, with the largest value on intact recordings (neura_walk, gaitmap_foot, 72 walks of
     ipol_walks, qmt_fullbody, mobgap_lowback, samples of DOT, Awinda and Opal, every simulated walk).
 
     Parameters
     ----------
-    moving_acc, moving_gyr : mean deviation of a channel over `smooth_s` from which on the sensor moves, m/s²
+    moving_acc, moving_gyr : mean deviation of a channel over `smooth_s` above which the sensor moves, m/s²
         and rad/s.
-    dead_s : repeated values of one channel while the sensor moves. change : repeats that one change takes
-        off, so that a channel that flickers is found and a coarse one is not.
-    clipped_s : time at the end of the range, beyond `clipped_share` of the time around it. A heel that
-        strikes beyond the range stays there for some milliseconds, 3 % of a stride at most.
-    frozen_s : a whole sensor repeats one sample that is none of rest (rest_acc, rest_gyr from gravity and
-        zero), `fewest` times at least. Good recordings never repeat one, and rounded to 0.1 m/s² and 1°/s
-        none for so long. The same of a sample of rest is known at its end, where the next one turns faster
-        than jump_gyr: nobody goes off like that. resting_s : a whole accelerometer or gyroscope repeats any
-        one while another sensor moves: a foot stands for long, a real one not for so long without a single
-        new value.
-    looped_s : a whole sensor repeats its last samples. packet_s : longest piece that is looked for.
+    dead_s : duration of repeated values of one channel while the sensor moves. change : number of repeats
+        subtracted by one change, so that a flickering channel is detected and a coarse one is not.
+    clipped_s : time at the range limit, in excess of `clipped_share` of the surrounding time. A heel strike
+        that exceeds the range lasts some milliseconds, 3 % of a stride at most.
+    frozen_s : a whole sensor repeats one sample that differs from rest (by rest_acc, rest_gyr from gravity
+        and zero), at least `fewest` times. Intact recordings never repeat one, and rounded to 0.1 m/s² and
+        1°/s none for this long. For a sample of rest it is detected at the end, if the next one rotates
+        faster than jump_gyr: no movement starts like that. resting_s : a whole accelerometer or gyroscope
+        repeats any sample while another sensor moves: a real foot may rest for long, but not this long
+        without a single new value.
+    looped_s : a whole sensor repeats its last samples. packet_s : longest repeated piece searched for.
     """
 
     moving_acc: float = 0.5
@@ -74,7 +75,7 @@ class StuckParams:
 
 
 class StuckWatch:
-    """The rule on n sensors, block by block; any division into blocks gives the same bits.
+    """The rule on n sensors, block by block; results are bit-identical for any division into blocks.
 
     Parameters
     ----------
@@ -93,13 +94,14 @@ class StuckWatch:
         self._state = _new_state(n, max(2, round(p.packet_s * rate_hz)) + 1)
 
     def push(self, acc: Floats, gyr: Floats, valid: Bools) -> tuple[Ints, Ints] | None:
-        """The fault (T, n) at each sample, 0 = none, and for how many samples before it holds as well (T, n).
+        """The fault (T, n) at each sample, 0 = none, and the number of preceding samples also affected (T,
+        n).
 
-        None where there is no fault.
+        None without any fault.
 
         Parameters
         ----------
-        acc, gyr : (T, n, 3) m/s², rad/s. valid : (T, n); other samples are passed over.
+        acc, gyr : (T, n, 3) m/s², rad/s. valid : (T, n); invalid samples are skipped.
         """
         bad, back = np.empty(valid.shape, np.int64), np.empty(valid.shape, np.int64)
         found = stuck_kernel(
@@ -109,14 +111,14 @@ class StuckWatch:
         return (bad, back) if found else None
 
     def describe(self, segment: Segment, sensor: int, kind: int, first_s: float) -> Notice:
-        """Say what is wrong with a sensor and since when."""
+        """Notice with the fault of a sensor and its start."""
         code, words = TOLD[kind]
         which = channel_words(np.flatnonzero(self._state.channels[sensor]).tolist())
-        return Notice(code, words.format(segment=segment, which=which, first=first_s), segment, first_s)
+        return Notice(code, Message(words, segment=segment, which=which, first=first_s), segment, first_s)
 
 
 def _new_state(n: int, packet: int) -> StuckState:
-    """The state before the first sample of n sensors; packet : samples that are kept of each."""
+    """The initial state of n sensors; packet : number of samples stored of each."""
     each = (n, CHANNELS)
     return StuckState(
         now=np.zeros(1, np.int64),
@@ -175,7 +177,7 @@ CODES: Final = frozenset(code for code, _ in TOLD.values())
 
 
 def channel_words(channels: Sequence[int]) -> str:
-    """Name channels 0 to 5 of a sensor.
+    """List channels 0 to 5 of a sensor.
 
     >>> channel_words([0, 3, 4, 5])
     'accelerometer (x) and gyroscope (x, y, z)'
@@ -192,8 +194,8 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
 
     Returns
     -------
-    the recording itself when all of them do. With `no_working_sensor` (an error) among its notices when no
-    sensor measures for long enough (`drop_stuck_sensors`).
+    The recording itself if all of them do. With `no_working_sensor` (an error) among its notices if no sensor
+    measures for long enough (`drop_stuck_sensors`).
     """
     segments = tuple(recording.sensors)
     signals = [recording.sensors[s] for s in segments]
@@ -244,8 +246,9 @@ NONE_LEFT: Final = (
 
 
 def drop_stuck_sensors(recording: UniformRecording) -> UniformRecording:
-    """The recording without sensors that were found stuck and measure for less than `LEAST` of it, and
-    without those of which no sample is left."""
+    """The recording without sensors found stuck that measure for less than `LEAST` of it, and without
+    those that have no sample left.
+    """
     stuck = {n.sensor for n in recording.notices if n.code in CODES}
     kept = {
         s: x
@@ -260,6 +263,6 @@ LEAST: Final = 0.5
 
 
 def compile_stuck_kernel() -> None:
-    """Compile the kernel or load it."""
+    """Compile the kernel or load it from the cache."""
     one = np.zeros((1, 1, 3))
     StuckWatch(1, 100.0).push(one, one, np.ones((1, 1), np.bool_))

@@ -1,4 +1,4 @@
-"""The compiled part of the rule on stuck channels; stuck.py explains it."""
+"""The compiled rule on stuck channels; explained in stuck.py."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ Ints = NDArray[np.int64]
 
 
 class StuckRule(NamedTuple):
-    """`StuckParams` at a sample rate; times are samples. relief : what a sample below the end of the range
-    takes off the count of those at it."""
+    """`StuckParams` at a sample rate; times are samples. relief : decrease of the count of samples at the
+    range limit per sample below it.
+    """
 
     share: float
     moving_acc: float
@@ -47,16 +48,16 @@ class StuckRule(NamedTuple):
 
 
 class StuckState(NamedTuple):
-    """What is known of n sensors.
+    """State of n sensors.
 
     Parameters
     ----------
     now : (1,) index of the next sample. last, mean, dev, top : (n, 6) last sample, its mean and mean
-        deviation, and the largest size. stays, begun, clip, clip_begun : (n, 6) repeats, samples at the end
-        of the range, and where either began. same : (n,) samples in a row equal to the one before.
+        deviation, and the largest size. stays, begun, clip, clip_begun : (n, 6) repeats, samples at the range
+        limit, and where either began. same : (n,) consecutive samples equal to the previous one.
     others, others_begun : (n, 2) the same of all of acc, of gyr, while another sensor moved, and where that
-        began. ring : (n, P, 6) last samples, `place` (1,) the next to be written. loop : (n, P) samples in a
-        row equal to the one p + 1 before. kind : (n,) what is wrong for good. channels : (n, 6) which.
+        began. ring : (n, P, 6) last samples, `place` (1,) the next to be written. loop : (n, P) consecutive
+        samples equal to the one p + 1 earlier. kind : (n,) permanent fault. channels : (n, 6) affected ones.
     """
 
     now: Ints
@@ -80,7 +81,7 @@ class StuckState(NamedTuple):
 
 @inner_njit(**UNCOUNTED)
 def _rests(x, rule):  # type: ignore[no-untyped-def]
-    """Whether a sample (6,) is one of a sensor at rest."""
+    """Whether a sample (6,) is that of a sensor at rest."""
     force = np.sqrt(x[0] ** 2 + x[1] ** 2 + x[2] ** 2)
     rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
     return abs(force - rule.gravity) < rule.rest_acc and rate < rule.rest_gyr
@@ -88,7 +89,7 @@ def _rests(x, rule):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _find_movers(dev, valid, rule, moving):  # type: ignore[no-untyped-def]
-    """Write which sensors move (n,); how many of them measure."""
+    """Write which sensors move (n,); returns the number of sensors that measure."""
     movers = 0
     for i in range(len(moving)):
         moving[i] = False
@@ -101,7 +102,7 @@ def _find_movers(dev, valid, rule, moving):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _read_sample(acc, gyr, last, x, equal):  # type: ignore[no-untyped-def]
-    """Write a sample (6,) and which of it equals the last; whether all does."""
+    """Write a sample (6,) and which channels equal the previous one; returns whether all do."""
     whole = True
     for c in range(CHANNELS):
         x[c] = acc[c] if c < 3 else gyr[c - 3]
@@ -112,7 +113,7 @@ def _read_sample(acc, gyr, last, x, equal):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _follow_repeats(s, i, x, equal, whole, elsewhere, at, rule):  # type: ignore[no-untyped-def]
-    """Count how often a whole sensor repeats one sample; how many of them are lost, −1 if it measures.
+    """Count repeats of one sample by a whole sensor; returns the number of lost samples, −1 if it measures.
 
     elsewhere : another sensor moves.
     """
@@ -136,7 +137,9 @@ def _follow_repeats(s, i, x, equal, whole, elsewhere, at, rule):  # type: ignore
 
 @inner_njit(**UNCOUNTED)
 def _follow_loops(ring, loop, place, same, x, looped):  # type: ignore[no-untyped-def]
-    """Count how long a sensor repeats its last samples (P, 6); how many of them are lost, −1 if none."""
+    """Count repeats of the last samples (P, 6) of a sensor; returns the number of lost samples, −1 if
+    none.
+    """
     P = len(ring)
     lost = np.int64(-1)
     j = place - 1
@@ -157,7 +160,7 @@ def _follow_loops(ring, loop, place, same, x, looped):  # type: ignore[no-untype
 
 @inner_njit(**UNCOUNTED)
 def _ends_a_range(size, full):  # type: ignore[no-untyped-def]
-    """Whether a value is that at the end of a usual range."""
+    """Whether a value equals the limit of a common range."""
     near = False
     for f in range(len(full)):
         near = near or abs(size / full[f] - 1.0) < 0.01
@@ -166,9 +169,9 @@ def _ends_a_range(size, full):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-untyped-def]
-    """Count of each channel how often it stays, and how long at the end of its range; keep the sample.
+    """Count repeats and samples at the range limit for each channel; store the sample.
 
-    stays : what stays counts: the sensor moves, and not all of it stays.
+    stays : repeats are counted: the sensor moves, and not all of its channels repeat.
     """
     for c in range(CHANNELS):
         size = abs(x[c])
@@ -197,7 +200,7 @@ def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-
 
 @inner_njit(**UNCOUNTED)
 def _judge(s, i, whole, at, rule):  # type: ignore[no-untyped-def]
-    """Write whether a sensor is out for good from now on, and by which channels; where that began."""
+    """Write whether a sensor is permanently faulty from now on, and its channels; returns the start."""
     first = at
     for c in range(CHANNELS):
         s.channels[i, c] = s.stays[i, c] >= 0.8 * rule.dead
@@ -221,13 +224,13 @@ def _judge(s, i, whole, at, rule):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def stuck_kernel(acc, gyr, valid, rule, full, state, bad, back):  # type: ignore[no-untyped-def]
-    """Advance the state over a block; whether a sensor of it does not measure.
+    """Advance the state over a block; returns whether any sensor does not measure.
 
     Parameters
     ----------
     acc, gyr : (T, n, 3). valid : (T, n). rule, state : `StuckRule`, `StuckState` as plain tuples.
-    full : ends of usual ranges.
-    bad : (T, n) written, the fault. back : (T, n) written, samples before it for which it holds as well.
+    full : limits of common ranges. bad : (T, n) written, the fault. back : (T, n) written, number of
+        preceding samples also affected.
     """
     room = np.empty(CHANNELS), np.empty(CHANNELS, np.bool_), np.zeros(valid.shape[1], np.bool_)
     return _watch(acc, gyr, valid, StuckRule(*rule), full, StuckState(*state), bad, back, room)
@@ -235,7 +238,7 @@ def stuck_kernel(acc, gyr, valid, rule, full, state, bad, back):  # type: ignore
 
 @inner_njit(**UNCOUNTED)
 def _watch(acc, gyr, valid, rule, full, s, bad, back, room):  # type: ignore[no-untyped-def]
-    """What `stuck_kernel` does, in room that it gives."""
+    """`stuck_kernel` with work arrays provided by the caller."""
     x, equal, moving = room
     found = False
     for k in range(len(valid)):

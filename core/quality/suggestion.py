@@ -1,10 +1,10 @@
-"""Who wears what: a first guess for the upload page, from names, else from movement. A person confirms it.
+"""Suggested segment labels for the upload page, from names or movement, to be confirmed by the user.
 
-In walking the two legs swing in turn, so on one leg the rates and the shaking of neighbouring sensors rise
-and fall together, those of the other leg in between; the foot turns fastest, then the shank, then the thigh,
-and the pelvis least of all. Legs are numbered; core/quality/sides.py says which is the left one, if it can.
-Looked at on neura_walk (rates 3.3, 2.7, 1.9, 1.1 rad/s), qmt_fullbody and five simulated walks: the shaking
-of a thigh agrees with its own shank with r ≥ 0.62, with the other one with r ≤ 0.05.
+In walking the two legs swing alternately, so the rates and accelerations of neighbouring sensors on one leg
+rise and fall together, those of the other leg in between; the foot rotates fastest, then the shank, the
+thigh, and the pelvis least. Legs are numbered; core/quality/sides.py determines the left one if possible.
+Observed in neura_walk (rates 3.3, 2.7, 1.9, 1.1 rad/s), qmt_fullbody and five simulated walks: accelerations
+of a thigh correlate with its own shank with r ≥ 0.62, with the other one with r ≤ 0.05.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ MARGIN: Final = 0.2
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A guess and what it rests on.
+    """A suggested label and its basis.
 
     Parameters
     ----------
-    segment : None where nothing, or not the side, can honestly be said.
-    basis : "declared" (manifest), "label" (file or sensor name), "movement", None = no guess.
+    segment : None if it, or its side, is undetermined.
+    basis : "declared" (manifest), "label" (file or sensor name), "movement", None = no suggestion.
     part : kind of segment without its side. leg : 1 or 2, sensors with the same number are on one leg.
     """
 
@@ -57,7 +57,7 @@ class Suggestion:
 
 
 def suggest(recording: Recording) -> dict[str, Suggestion]:
-    """Guess a segment for every sensor: what is declared, else what its name says, else how it moves."""
+    """Suggest a segment for every sensor: as declared, else by its name, else by its movement."""
     out = {d: Suggestion() for d in recording.streams}
     taken: set[Segment] = set()
     for device, segment in recording.segments.items():
@@ -74,7 +74,7 @@ def suggest(recording: Recording) -> dict[str, Suggestion]:
 
 
 def suggest_segments(recording: Recording) -> dict[str, Segment | None]:
-    """Device id → suggested segment, None where nothing can honestly be said."""
+    """Device id → suggested segment, None if undetermined."""
     return {device: s.segment for device, s in suggest(recording).items()}
 
 
@@ -87,7 +87,7 @@ def _label(s: ImuStream) -> Segment | None:
 
 
 def _pair_of_feet(devices: list[str]) -> dict[str, Suggestion]:
-    """Two sensors whose names say a side and nothing else: strides need them on the feet."""
+    """Two sensors whose names indicate only a side: assumed on the feet, as required for strides."""
     sides = {device: side_in(device) for device in devices}
     if len(sides) != 2 or set(sides.values()) != {"l", "r"}:
         return {}
@@ -95,7 +95,7 @@ def _pair_of_feet(devices: list[str]) -> dict[str, Suggestion]:
 
 
 def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:
-    """Sort distinct sensors into trunk and two legs; empty when they do not look like a walking person."""
+    """Sort distinct sensors into trunk and two legs; empty if the movement is not that of walking."""
     distinct = list({s.digest: s for s in reversed(streams) if s.gyr is not None}.values())[::-1]
     if len(distinct) < 7 or len({s.clock for s in distinct}) > 1:
         return {}
@@ -141,7 +141,7 @@ def _by_movement(streams: list[ImuStream]) -> dict[str, Suggestion]:
 
 
 def _on_grid(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
-    """Acceleration and rate (sensor, sample, 3) of the common range at `GRID_HZ`; None when too short."""
+    """Acceleration and rate (sensor, sample, 3) over the common range at `GRID_HZ`; None if too short."""
     start = max(float(s.t_s[0]) for s in streams)
     end = min(float(s.t_s[-1]) for s in streams)
     n = int((end - start) * GRID_HZ)
@@ -163,7 +163,9 @@ def _on_grid(streams: list[ImuStream]) -> tuple[Floats, Floats] | None:
 def _legs(
     energy: Floats, alike: Floats, bond: Floats, limbs: list[int]
 ) -> tuple[list[int], list[int]] | None:
-    """Split leg sensors: the fastest of each leg, then each next one joins the leg it is bound to more."""
+    """Split leg sensors: the fastest of each leg, then each next one joins the leg with the higher
+    correlation.
+    """
     fastest = max(limbs, key=lambda i: energy[i])
     against = [i for i in limbs if energy[i] > 0.7 * energy[fastest] and alike[fastest, i] < 0.0]
     if not against:
@@ -179,7 +181,7 @@ def _legs(
 
 
 def _bodies(leg: list[int], alike: Floats) -> list[list[int]]:
-    """Group the sensors of a leg that sit on one rigid body."""
+    """Group the sensors of a leg that are on the same rigid body."""
     bodies: list[list[int]] = []
     for i in leg:
         body = next((b for b in bodies if all(alike[i, j] > ONE_BODY for j in b)), None)

@@ -1,4 +1,5 @@
-"""Units and signs that make every later number wrong: found by physics, said before anything is computed.
+"""Implausible units and signs, which would invalidate all results: detected by physics before any
+computation.
 
 Thresholds: docs/science/quality.md, "Units and signs" (rest norm 9.81 m/s² or 1 g ± 10 %, gyroscope at rest
 below 0.2 rad/s, largest rate above 10 °/s) unless marked as our choice.
@@ -13,6 +14,7 @@ import numpy as np
 from sagittal.core import rotation
 from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.message import Message
 from sagittal.core.quality.signals import Facts
 from sagittal.core.signals.held_samples import is_complete
 from sagittal.core.signals.rest import LARGEST_BIAS
@@ -36,7 +38,7 @@ _FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "ra
 
 
 def list_suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
-    """All suspicions about one sensor, the grave ones as errors; acc (n, 3) m/s², quat (n, 4)."""
+    """All suspicions about one sensor, severe ones as errors; acc (n, 3) m/s², quat (n, 4)."""
     found = [*_acceleration(device, f), *_rate(device, f)]
     if quat is not None:
         found += _sign(device, acc, quat)
@@ -58,9 +60,13 @@ def _acceleration(device: str, f: Facts) -> list[Notice]:
         return [
             _say(
                 "unit_suspect",
-                f"Sensor {device}: acceleration at rest is {n:.2f}, expected 9.81 m/s² (±10 %); it is in "
-                "g but was read "
-                f"as m/s²: {_FIX_ACC}.",
+                Message(
+                    "Sensor {device}: acceleration at rest is {value:.2f}, expected 9.81 m/s² (±10 %); "
+                    "it is in g but was read as m/s²: {FIX_ACC}.",
+                    device=device,
+                    value=n,
+                    FIX_ACC=_FIX_ACC,
+                ),
                 device,
             )
         ]
@@ -69,8 +75,13 @@ def _acceleration(device: str, f: Facts) -> list[Notice]:
     return [
         _say(
             "unit_suspect",
-            f"Sensor {device}: acceleration at rest is {n:.2f} m/s², expected 9.81 m/s² (±10 %); "
-            f"check its calibration, or {_FIX_ACC}.",
+            Message(
+                "Sensor {device}: acceleration at rest is {value:.2f} m/s², expected 9.81 m/s² (±10 "
+                "%); check its calibration, or {FIX_ACC}.",
+                device=device,
+                value=n,
+                FIX_ACC=_FIX_ACC,
+            ),
             device,
             "error" if off > FAR_OFF else "warning",
         )
@@ -78,7 +89,7 @@ def _acceleration(device: str, f: Facts) -> list[Notice]:
 
 
 def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
-    """Without a still second only the median over the take can be judged: walking keeps it near gravity."""
+    """Check of the median over the recording, used without a still second: walking keeps it near gravity."""
     m = f.median_norm
     if 0.5 * GRAVITY <= m <= 2 * GRAVITY:
         return []
@@ -86,9 +97,13 @@ def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
         return [
             _say(
                 "unit_suspect",
-                f"Sensor {device}: acceleration is around {m:.2f}, expected about 9.81 m/s²; it looks "
-                "like g read as "
-                f"m/s²: {_FIX_ACC}.",
+                Message(
+                    "Sensor {device}: acceleration is around {value:.2f}, expected about 9.81 m/s²; it "
+                    "looks like g read as m/s²: {FIX_ACC}.",
+                    device=device,
+                    value=m,
+                    FIX_ACC=_FIX_ACC,
+                ),
                 device,
             )
         ]
@@ -97,7 +112,13 @@ def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
     return [
         _say(
             "unit_suspect",
-            f"Sensor {device}: acceleration is around {m:.1f} m/s², expected about 9.81 m/s²; {_FIX_ACC}.",
+            Message(
+                "Sensor {device}: acceleration is around {value:.1f} m/s², expected about 9.81 "
+                "m/s²; {FIX_ACC}.",
+                device=device,
+                value=m,
+                FIX_ACC=_FIX_ACC,
+            ),
             device,
         )
     ]
@@ -106,9 +127,14 @@ def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
 def _no_gravity(device: str, n: float, when: str) -> Notice:
     return _say(
         "gravity_removed",
-        f"Sensor {device}: acceleration {when} is {n:.2f} m/s², expected 9.81; gravity seems to have been "
-        "removed, but "
-        "it is needed for orientation. Export the raw acceleration (Acc, not FreeAcc).",
+        Message(
+            "Sensor {device}: acceleration {when} is {value:.2f} m/s², expected 9.81; gravity "
+            "seems to have been removed, but it is needed for orientation. Export the raw "
+            "acceleration (Acc, not FreeAcc).",
+            device=device,
+            when=when,
+            value=n,
+        ),
         device,
     )
 
@@ -120,9 +146,14 @@ def _rate(device: str, f: Facts) -> list[Notice]:
         return [
             _say(
                 "unit_suspect",
-                f"Sensor {device}: angular rate reaches {f.gyro_top:.0f} rad/s, more than any sensor "
-                "measures "
-                f"({GYRO_RANGE:.0f}); it is in deg/s but was read as rad/s: {_FIX_GYR}.",
+                Message(
+                    "Sensor {device}: angular rate reaches {gyro_top:.0f} rad/s, more than any sensor "
+                    "measures ({GYRO_RANGE:.0f}); it is in deg/s but was read as rad/s: {FIX_GYR}.",
+                    device=device,
+                    gyro_top=f.gyro_top,
+                    GYRO_RANGE=GYRO_RANGE,
+                    FIX_GYR=_FIX_GYR,
+                ),
                 device,
             )
         ]
@@ -131,10 +162,15 @@ def _rate(device: str, f: Facts) -> list[Notice]:
         return [
             _say(
                 "unit_suspect",
-                f"Sensor {device}: angular rate is {f.still_gyro:.2f} rad/s while the acceleration is "
-                "still, expected "
-                f"less than {rest:.2g}; it may be in deg/s but read as rad/s ({_FIX_GYR}), or the bias "
-                "is broken.",
+                Message(
+                    "Sensor {device}: angular rate is {still_gyro:.2f} rad/s while the acceleration is "
+                    "still, expected less than {rest:.2g}; it may be in deg/s but read as rad/s ({FIX_GYR}), "
+                    "or the bias is broken.",
+                    device=device,
+                    still_gyro=f.still_gyro,
+                    rest=rest,
+                    FIX_GYR=_FIX_GYR,
+                ),
                 device,
             )
         ]
@@ -142,9 +178,13 @@ def _rate(device: str, f: Facts) -> list[Notice]:
         return [
             _say(
                 "unit_suspect",
-                f"Sensor {device}: angular rate never exceeds {np.degrees(f.gyro_top):.1f} deg/s although "
-                "the sensor moves, "
-                f"expected more than 10; it is in rad/s but was read as deg/s: {_FIX_GYR}.",
+                Message(
+                    "Sensor {device}: angular rate never exceeds {gyro_top:.1f} deg/s although the "
+                    "sensor moves, expected more than 10; it is in rad/s but was read as deg/s: {FIX_GYR}.",
+                    device=device,
+                    gyro_top=np.degrees(f.gyro_top),
+                    FIX_GYR=_FIX_GYR,
+                ),
                 device,
             )
         ]
@@ -152,7 +192,7 @@ def _rate(device: str, f: Facts) -> list[Notice]:
 
 
 def _sign(device: str, acc: Floats, quat: Floats) -> list[Notice]:
-    """With the vendor's orientation (sensor → z up) specific force must point up on average."""
+    """Check with the vendor's orientation (sensor → z up) that specific force points up on average."""
     good = is_complete(acc) & is_complete(quat)
     if np.count_nonzero(good) < 10:
         return []
@@ -162,9 +202,13 @@ def _sign(device: str, acc: Floats, quat: Floats) -> list[Notice]:
     return [
         _say(
             "gravity_sign",
-            f"Sensor {device}: acceleration points down ({world[2]:.1f} m/s² along the sensor's own "
-            "vertical), expected "
-            "up (+9.8) at rest; the exporting software reversed its sign. Export specific force.",
+            Message(
+                "Sensor {device}: acceleration points down ({world:.1f} m/s² along the sensor's own "
+                "vertical), expected up (+9.8) at rest; the exporting software reversed its sign. "
+                "Export specific force.",
+                device=device,
+                world=world[2],
+            ),
             device,
         )
     ]

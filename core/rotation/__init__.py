@@ -1,10 +1,10 @@
 """Quaternions, rotation matrices and rotation vectors: on arrays (`arrays`) and one at a time (`compiled`).
 
-Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*.
-Source: docs/reference/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
+Hamilton, scalar first (w, x, y, z); q maps body to world: v_W = q ⊗ v_B ⊗ q*. Source:
+docs/reference/coordinate-systems.md, "Frames"; references in docs/science/orientation.md.
 
-What this package gives itself is numpy and takes arrays with any leading axes. Compiled loops import
-`sagittal.core.rotation.compiled`, which brings numba; readers of results do without.
+The functions of the package itself use numpy and accept arrays with any leading axes. Compiled loops import
+`sagittal.core.rotation.compiled`, which requires numba; readers of results do not need it.
 """
 
 from sagittal.core.rotation.arrays import (

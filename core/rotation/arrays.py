@@ -19,8 +19,8 @@ Angle = TypeVar("Angle", float, Floats)
 
 
 def find_squares(v: Floats) -> Floats:
-    """Squares (...) of the lengths of vectors (..., k): NumPy's sums, whose loop over three takes six times
-    as long.
+    """Squared lengths (...) of vectors (..., k), as an explicit sum for three components; np.sum takes six
+    times as long.
     """
     first, *more = _components(v)
     total = first * first
@@ -30,7 +30,7 @@ def find_squares(v: Floats) -> Floats:
 
 
 def find_lengths(v: Floats) -> Floats:
-    """Lengths (...) of vectors (..., k), to the bit those of `np.linalg.norm`."""
+    """Lengths (...) of vectors (..., k), bit-identical to `np.linalg.norm`."""
     return np.asarray(np.sqrt(find_squares(v)))
 
 
@@ -73,7 +73,7 @@ def rotate(q: Floats, v: Floats) -> Floats:
 
 
 def find_vertical(q: Floats) -> Floats:
-    """Where the z axis of the world points in bodies (n, 3), from q (n, 4): as `rotate`, to the bit."""
+    """World z axis in body frames (n, 3), from q (n, 4); bit-identical to `rotate`."""
     w, x, y, z = _components(np.asarray(q, np.float64))
     a, b = -2.0 * y, 2.0 * x
     return np.stack((0.0 + w * a + z * b, 0.0 + w * b - z * a, 1.0 + (y * a - x * b)), axis=-1)
@@ -164,17 +164,17 @@ def about(axis: int, angle: Floats | float) -> Floats:
 
 
 def yaw(q: Floats) -> Floats:
-    """Heading (...) in rad of the body's x axis in the world's floor plane, from x towards y."""
+    """Heading (...) in rad of the body's x axis in the horizontal plane of the world, from x towards y."""
     x = rotate(q, np.array([1.0, 0.0, 0.0]))
     return np.asarray(np.arctan2(x[..., 1], x[..., 0]))
 
 
 def split_heading(q: Floats) -> tuple[Floats, Floats]:
-    """Take rotations (..., 4) apart: first a turn about the vertical, then a tilt about a horizontal axis.
+    """Decompose rotations (..., 4) into a turn about the vertical followed by a tilt about a horizontal axis.
 
     Returns
     -------
-    The tilt (..., 2), a rotation vector in the floor plane, and the turn (...), rad in [−π, π].
+    The tilt (..., 2), a rotation vector in the horizontal plane, and the turn (...), rad in [−π, π].
     """
     q = np.where(q[..., :1] < 0.0, -q, q)
     turn = 2.0 * np.arctan2(q[..., 3], q[..., 0])
@@ -182,18 +182,20 @@ def split_heading(q: Floats) -> tuple[Floats, Floats]:
 
 
 def wrap_angle(angle: Angle) -> Angle:
-    """The same angle (...) in rad in [−π, π)."""
+    """Wrap angles (...) in rad to [−π, π)."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def _are_long(a: Floats, b: Floats) -> bool:
-    """One of both is (n, k) of many rows, and none has more axes."""
+    """Whether one of the two arrays is (n, k) with many rows, and none has more axes."""
     return max(a.size, b.size) > 4 * AT_A_TIME and max(a.ndim, b.ndim) == 2
 
 
 def _by_rows(of: Callable[[Floats, Floats], Floats], width: int, a: Floats, b: Floats) -> Floats:
-    """Rows (n, width) that a function makes of those of a and b, (n, k) or the same for all, block by block:
-    what is made on the way stays in the processor's cache."""
+    """Apply a function row-wise to a and b, (n, k) or the same for all rows, block by block.
+
+    Temporary arrays then fit into the processor's cache.
+    """
     found = np.empty((max(len(x) for x in (a, b) if x.ndim == 2), width))
     for part in cut_blocks(len(found)):
         found[part] = of(*(x[part] if x.ndim == 2 and len(x) == len(found) else x for x in (a, b)))
@@ -206,7 +208,9 @@ def _components(x: Floats) -> tuple[Floats, ...]:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Cross product, broadcasting; the sums of np.cross, which takes ten times as long for one vector."""
+    """Cross product, broadcasting; the sums written out, ten times faster than np.cross for a single
+    vector.
+    """
     ax, ay, az = _components(a)
     bx, by, bz = _components(b)
     return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)

@@ -1,7 +1,7 @@
 """Rotations inside compiled loops: one quaternion (4,) or matrix (3, 3) at a time, no allocation.
 
-What a function gives goes into its last argument, which must be none of the others, or is returned. Compiled
-without counting references to arrays (`_nrt`), which costs more than most of these.
+Array results are written to the last argument, which must not alias the others; scalars are returned.
+Compiled without reference counting of arrays (`_nrt`), which would cost more than most of these functions.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SERIES = 1e-4
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def wrap_angle(angle):  # type: ignore[no-untyped-def]
-    """The same angle in rad in [−π, π)."""
+    """Wrap an angle in rad to [−π, π)."""
     return (angle + pi) % (2.0 * pi) - pi
 
 
@@ -166,7 +166,9 @@ def exp_so3(phi: Floats, rotation: Floats, jacobian: Floats) -> None:
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def log_so3(rotation: Floats, out: Floats) -> None:
-    """Write the rotation vector (3,), norm ≤ π, of a matrix, by way of the quaternion's largest component."""
+    """Write the rotation vector (3,), norm ≤ π, of a matrix, computed from the quaternion's largest
+    component.
+    """
     d0, d1, d2 = rotation[0, 0], rotation[1, 1], rotation[2, 2]
     a = rotation[2, 1] - rotation[1, 2]
     b = rotation[0, 2] - rotation[2, 0]
@@ -193,7 +195,7 @@ def log_so3(rotation: Floats, out: Floats) -> None:
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def orthonormalise(rotation: Floats, work: Floats) -> None:
-    """Take rounding out of a rotation (3, 3) in place: R ← R (3 − RᵀR) / 2; work is (2, 3, 3)."""
+    """Remove rounding errors from a rotation (3, 3) in place: R ← R (3 − RᵀR) / 2; work is (2, 3, 3)."""
     gram, copy = work[0], work[1]
     for i in range(3):
         for j in range(3):

@@ -1,4 +1,4 @@
-"""Mistakes in the set-up of a take: units, axes and signs of sensors, and who wears what."""
+"""Errors in the sensor set-up of a recording: units, axes, signs and segment labels."""
 
 from sagittal.core.setup.params import SetupParams
 from sagittal.core.setup.propose import propose_repair

@@ -1,9 +1,9 @@
-"""Whether a gyroscope and its accelerometer have the same axes and signs.
+"""Consistency of axes and signs between a gyroscope and its accelerometer.
 
-Between a rest and the walking beside it a sensor tilts. Its gyroscope must carry gravity, as measured at
-rest, to the mean specific force of some strides: over strides the body's own acceleration averages to
-nothing. So all 48 ways to name and sign the axes of the gyroscope can be tried, and its two units; how the
-sensor is mounted never enters.
+A sensor tilts between a rest and the adjacent walking. Rotated by the gyroscope, gravity measured at rest
+must match the mean specific force over some strides, because the body's own acceleration averages to zero
+over strides. All 48 permutations and signs of the gyroscope axes, and two units, can thus be tested
+independently of the sensor-to-segment alignment.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ SHAKING: Final = 1.0
 
 @dataclass(frozen=True, eq=False)
 class AxesFit:
-    """How well a gyroscope goes with its accelerometer.
+    """How well a gyroscope matches its accelerometer.
 
     Parameters
     ----------
-    windows : averages it rests on. stated : RMS misfit of the rates as stated, m/s².
-    misfits : (50,) of all `CHOICES`, None where no other fits that much better.
+    windows : number of averaging windows. stated : RMS misfit of the rates as declared, m/s².
+    misfits : (50,) of all `CHOICES`, None if no alternative fits clearly better.
     """
 
     windows: int
@@ -63,7 +63,9 @@ class AxesFit:
 
 
 def fit_axes(signals: SensorSignals, rate_hz: float, params: SetupParams) -> AxesFit | None:
-    """Compare the stated axes of a gyroscope, where they do not fit all others; None = nothing is said."""
+    """Compare the declared gyroscope axes with all alternatives if they fit poorly; None with too little
+    data.
+    """
     quiet = measure_quietness(signals, rate_hz)
     windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
@@ -80,7 +82,7 @@ def fit_axes(signals: SensorSignals, rate_hz: float, params: SetupParams) -> Axe
 
 
 def refuses_choice(signals: SensorSignals, rate_hz: float, choice: Floats, params: SetupParams) -> bool:
-    """Whether a sensor speaks against one of `CHOICES` that others of its export need."""
+    """Whether a sensor's data rule out one of `CHOICES` required by other sensors of the same export."""
     quiet = measure_quietness(signals, rate_hz)
     windows = _list_windows(signals, quiet.quiet, rate_hz, params)
     if len(windows) < params.least_windows:
@@ -92,12 +94,12 @@ def refuses_choice(signals: SensorSignals, rate_hz: float, choice: Floats, param
 
 @dataclass(frozen=True)
 class _Window:
-    """A rest and the walking beside it.
+    """A rest and the adjacent walking.
 
     Parameters
     ----------
-    order : samples from the last one at rest into the walking, which may lie before it. still : of the rest.
-    part : samples of `order` that are averaged.
+    order : samples from the rest into the walking, possibly backwards in time. still : samples of the rest.
+    part : averaged samples of `order`.
     """
 
     order: slice
@@ -106,7 +108,7 @@ class _Window:
 
 
 def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: SetupParams) -> list[_Window]:
-    """Averages of walking that can be carried back to a rest without a lost sample."""
+    """Averaging windows in walking that are connected to a rest without lost samples."""
     length, rest = round(params.sample_s * rate_hz), round(REST_S * rate_hz)
     found = []
     for a, b in (r for r in find_runs(quiet) if r[1] - r[0] >= rest):
@@ -122,7 +124,9 @@ def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: 
 
 
 def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool:
-    """A gyroscope in the wrong unit may seem not to turn: a force that shakes counts too."""
+    """Whether a sensor moves; varying force counts too, since a gyroscope in the wrong unit may appear
+    still.
+    """
     gyr, acc = (signals.cut(name, window.order)[window.part] for name in ("gyr", "acc"))
     rate, shaking = np.sqrt((gyr**2).sum(axis=1).mean()), np.linalg.norm(acc, axis=1).std()
     return bool(rate > params.least_rate or shaking > SHAKING)
@@ -130,12 +134,12 @@ def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """What a sensor measured from a rest into the walking beside it, forwards or backwards.
+    """Data of a sensor from a rest into the adjacent walking, forwards or backwards in time.
 
     Parameters
     ----------
-    rate : (n, 3) rad/s, without bias. force : (n, 3) m/s². part : samples that are averaged. weights : of
-        these. level : (3,) mean force at rest, m/s².
+    rate : (n, 3) rad/s, without bias. force : (n, 3) m/s². part : averaged samples. weights : of these.
+    level : (3,) mean force at rest, m/s².
     """
 
     rate: Floats
@@ -158,7 +162,9 @@ def _list_walks(signals: SensorSignals, windows: list[_Window], bias: Floats) ->
 
 
 def _measure(walks: list[_Walk], rate_hz: float, choice: Floats = CHOICES[0], limit: float = np.inf) -> float:
-    """RMS difference of a rest and the mean force carried back to it, m/s²; inf where above a limit."""
+    """RMS difference between gravity at rest and the mean force rotated back to it, m/s²; inf above a
+    limit.
+    """
     total = 0.0
     for walk in walks:
         rate, force, part = walk.rate @ choice.T, walk.force, walk.part

@@ -1,4 +1,4 @@
-"""Limits of what is said about a set-up."""
+"""Thresholds of the set-up checks."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SetupParams:
-    """When a set-up is said to be wrong (docs/science/setup.md).
+    """Thresholds of the set-up checks (docs/science/setup.md).
 
     Parameters
     ----------
-    refuse : False analyses a take all the same whose set-up is wrong; what is found is told.
-    sample_s : how long walking is averaged against the rest beside it; begins_s : so long after or before it.
-        Three averages of each rest.
-    least_rate : averages in which a sensor turns less say nothing, rad/s RMS.
-    least_windows : fewer say nothing of a sensor.
-    misfit_mps2, misfit_ratio : of an accelerometer and its gyroscope, from which they are said to differ, and
-        over that of the best other axes. Right sensors have at most 0.7 m/s² and 1.2 (neura_walk,
-        qmt_fullbody, gaitmap_foot, simulated people), wrong signs 4 to 8 m/s² and 6 or more on real takes.
-    distinct : other axes that fit so much worse than the best are ruled out.
+    refuse : False analyses a recording despite an incorrect set-up, with a notice.
+    sample_s : averaging time of walking next to a rest; begins_s : its distances from the rest. Three
+    averages per rest.
+    least_rate : averages with a lower rate of turn are ignored, rad/s RMS.
+    least_windows : minimum number to judge a sensor.
+    misfit_mps2, misfit_ratio : misfit between accelerometer and gyroscope that counts as a contradiction,
+    absolute and relative to that of the best alternative axes. Correct sensors have at most 0.7 m/s² and 1.2
+    (neura_walk,
+        qmt_fullbody, gaitmap_foot, simulated people), wrong signs 4 to 8 m/s² and 6 or more on real
+        recordings.
+    distinct : alternatives that fit worse than the best by this factor are ruled out.
     """
 
     refuse: bool = True

@@ -1,7 +1,7 @@
-"""Look at a take's set-up and propose what would put it right, one kind of mistake at a time.
+"""Check the set-up of a recording and propose a correction, one kind of mistake at a time.
 
-Wrong units hide wrong axes, and wrong axes hide wrong labels: the first kind that is found is proposed, the
-next once that is confirmed and the take is analysed again.
+Wrong units mask wrong axes, and wrong axes mask wrong labels: the first kind detected is proposed, the next
+one after confirmation and another analysis.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sagittal.core.agreement import Agreement, AgreementParams
 from sagittal.core.agreement.agree import compare_sensors
 from sagittal.core.agreement.exchange import find_exchange
 from sagittal.core.frames import FOOT, GRAVITY, SHANK, SIDES, THIGH, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.quality.sides import find_left_leg
 from sagittal.core.quality.signals import Facts, measure_signal, measure_stream
 from sagittal.core.quality.suspicion import list_suspicions
@@ -37,11 +38,12 @@ def propose_repair(
     params: SetupParams | None = None,
     agreement: AgreementParams | None = None,
 ) -> SetupRepair | None:
-    """What is wrong with units or axes, before the sensors are compared with each other; None = nothing seen.
+    """Errors in units or axes, checked before the sensors are compared with each other; None if none are
+    detected.
 
     Parameters
     ----------
-    recording : as read. uniform : the same take on its axis.
+    recording : as read. uniform : the same recording on the uniform axis.
     """
     params, agreement = params or SetupParams(), agreement or AgreementParams()
     worn = {s: recording.streams[x.device_id] for s, x in uniform.sensors.items()}
@@ -49,17 +51,24 @@ def propose_repair(
 
 
 def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair | None:
-    """What the sensors say of each other beyond the exchanges that an analysis undoes by itself."""
+    """Label errors found by comparing sensors, other than swaps that an analysis corrects automatically."""
     exchange = agreed.exchange
     if exchange is not None and exchange.mirrored:
         turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
         which = _list(sorted(exchange.mirrored))
-        said = f"The accelerometer of {which} has its signs turned round: the joints beside it fit a mirror."
+        said = Message(
+            "The accelerometer of {which} has its signs turned round: the joints beside it fit a mirror.",
+            which=which,
+        )
         return SetupRepair("axes", (said,), exchange.ratio, corrections=turned)
     if exchange is not None and exchange.mixed_up:
         segments = {uniform.sensors[x].device_id: s for s, x in exchange.mixed_up.items()}
-        moved = [f"that of {x} is worn on {s}" for s, x in exchange.mixed_up.items() if s != x]
-        said = f"The joints show that sensors are mixed up: {_list(moved)}."
+        moved: list[str] = [
+            Message("that of {value} is worn on {value2}", value=x, value2=s)
+            for s, x in exchange.mixed_up.items()
+            if s != x
+        ]
+        said = Message("The joints show that sensors are mixed up: {moved}.", moved=_list(moved))
         return SetupRepair("labels", (said,), exchange.ratio, segments)
     if exchange is None or exchange.cosine is None:
         return _propose_legs(uniform)
@@ -67,7 +76,9 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
 
 
 def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
-    """Factors of sensors whose unit physics refuses, where exactly one simple change satisfies it."""
+    """Scale factors of sensors with a physically impossible unit, if exactly one simple change resolves
+    it.
+    """
     corrections: dict[str, SensorCorrection] = {}
     said: list[str] = []
     for segment, stream in worn.items():
@@ -95,12 +106,16 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
         corrections |= {x.device_id: one for x in follow.values()}
         said += follow
     return SetupRepair(
-        "units", (f"Units or signs of {_list(said)} are not those of a body.",), np.inf, {}, corrections
+        "units",
+        (Message("Units or signs of {said} are not those of a body.", said=_list(said)),),
+        np.inf,
+        {},
+        corrections,
     )
 
 
 def _list_remaining(stream: ImuStream, correction: SensorCorrection) -> set[str]:
-    """Codes of what is refused of a sensor that was put right."""
+    """Codes of the errors that remain for a sensor after correction."""
     acc = correction.correct_acc(stream.acc)
     gyr = None if stream.gyr is None else correction.correct_gyr(stream.gyr)
     return _list_errors(stream, measure_signal(acc, gyr, stream.rate_hz), acc)
@@ -114,13 +129,18 @@ def _list_errors(stream: ImuStream, facts: Facts, acc: Floats) -> set[str]:
 def _propose_axes(
     uniform: UniformRecording, params: SetupParams, agreement: AgreementParams
 ) -> SetupRepair | None:
-    """Gyroscopes that do not carry gravity where their accelerometer finds it."""
+    """Corrections of gyroscopes that do not rotate gravity consistently with their accelerometer."""
     found = {s: fit_axes(x, uniform.rate_hz, params) for s, x in uniform.sensors.items()}
     wrong = {s: f.misfits for s, f in found.items() if f is not None and f.misfits is not None}
     if not wrong:
         return None
     which = _list(sorted(wrong))
-    said = [f"The gyroscope of {which} does not turn as its accelerometer shows; other axes or units do."]
+    said: list[str] = [
+        Message(
+            "The gyroscope of {which} does not turn as its accelerometer shows; other axes or units do.",
+            which=which,
+        )
+    ]
     margin = min(fits[0] / fits[1:].min() for fits in wrong.values())
     judged = len([f for f in found.values() if f is not None])
     gyr = _choose_axes(wrong, judged, params)
@@ -156,9 +176,9 @@ def _correct_gyr(gyr: Floats, acc_axes: tuple[str, ...]) -> SensorCorrection:
 def _choose_axes(
     wrong: Mapping[Segment, Floats], judged: int, params: SetupParams
 ) -> dict[Segment, Floats] | None:
-    """What each gyroscope is to be multiplied by; None where several fit alike.
+    """Correction matrix for each gyroscope; None if several fit equally well.
 
-    Sensors of one export are read alike: where most of them are wrong they are judged together.
+    Sensors of one export are parsed alike: if most of them are wrong they are judged together.
     """
     if 2 * len(wrong) > judged and len(wrong) > 1:
         # every sensor counts by how well it can be told
@@ -171,17 +191,17 @@ def _choose_axes(
 
 
 def _choose_one(misfits: Floats, params: SetupParams) -> Floats | None:
-    """The only one of `CHOICES` that is not ruled out; all signs round where that is the best of several."""
+    """The only one of `CHOICES` not ruled out; inversion of all signs if that is the best of several."""
     best = int(np.argmin(misfits))
     alone = np.count_nonzero(misfits <= params.distinct * misfits[best]) == 1
     return np.asarray(CHOICES[best]) if alone or best == REVERSED else None
 
 
 def _leaves_hands_open(gyr: Floats) -> bool:
-    """Whether an accelerometer in a mirror is as likely as a right one, by what its gyroscope needs.
+    """Whether a left-handed accelerometer is as plausible as a correct one, given the gyroscope correction.
 
-    With all signs round the file may have left-handed axes; what is a rotation of the gyroscope may as well
-    be a sign of the accelerometer. Else it would take two mistakes.
+    If all signs are inverted the file may have left-handed axes; a rotation of the gyroscope may equally be a
+    sign error of the accelerometer. Otherwise two mistakes would be required.
     """
     a_unit = np.array_equal(gyr, gyr[0, 0] * np.eye(3)) and gyr[0, 0] > 0.0
     return not a_unit and bool(np.linalg.det(gyr) > 0.0 or np.array_equal(gyr, -np.eye(3)))
@@ -190,10 +210,10 @@ def _leaves_hands_open(gyr: Floats) -> bool:
 def _judge_hands(
     uniform: UniformRecording, gyr: Mapping[Segment, Floats], agreement: AgreementParams
 ) -> frozenset[Segment] | None:
-    """Those whose accelerometer must be turned round too, once gyroscopes go with them; None = unknown.
+    """Segments whose accelerometer must be inverted along with the gyroscope; None = unknown.
 
-    Left-handed axes of a whole export make a mirror image, which only the hips tell, left and right of the
-    way the feet go. Exchanged legs would look the same: one mistake is likelier than two.
+    Left-handed axes of a whole export produce a mirror image, which only the hips reveal, left and right of
+    the direction of the feet. Swapped legs would look the same; one mistake is likelier than two.
     """
     fixed = {
         s: x.change(gyr=np.ascontiguousarray(x.gyr @ gyr[s].T)) if s in gyr else x
@@ -216,7 +236,7 @@ LOOK_HZ: Final = 50.0
 
 
 def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
-    """Left and right exchanged, where the pelvis is pushed to the side of the leg that is said to stand."""
+    """Propose swapped legs if the pelvis accelerates towards the leg labelled as the stance leg."""
     pelvis = uniform.sensors.get("pelvis")
     pair = next((p for p in (FOOT, SHANK, THIGH) if set(p.values()) <= set(uniform.sensors)), None)
     if pelvis is None or pair is None:

@@ -1,4 +1,4 @@
-"""What is proposed where a set-up is wrong: data that can be applied, kept and applied again."""
+"""Proposed set-up corrections as data that can be applied, stored and reapplied."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.manifest import manifest_of
 from sagittal.core.frames import Segment
+from sagittal.core.message import join_messages
 from sagittal.core.signals.correction import SensorCorrection
 
 SetupMistake = Literal["units", "axes", "labels", "mounting"]
@@ -18,18 +19,17 @@ SetupMistake = Literal["units", "axes", "labels", "mounting"]
 
 @dataclass(frozen=True)
 class SetupRepair:
-    """One kind of mistake and what would put it right; a person confirms it.
+    """One kind of set-up mistake and its correction, to be confirmed by the user.
 
     Parameters
     ----------
-    kind : units or signs of sensors, their axes, who wears what, or how it is said to sit.
-    segments : device id → segment, of all worn sensors, where labels are wrong; else empty.
-    corrections : device id → correction, of the sensors that need one. mounting : segment → words that say
-        how its sensor sits, where the declared ones are wrong. All empty: something is wrong, and what would
-        put it right cannot be said.
+    kind : units or signs of sensors, their axes, segment labels, or the declared sensor placement.
+    segments : device id → segment, of all sensors, if labels are wrong; else empty.
+    corrections : device id → correction, of the sensors that need one. mounting : segment → corrected
+    placement text, if the declared one is wrong. All empty: a mistake without a known correction.
     evidence : sentences.
-    margin : misfit as stated over that of the proposal; 1 where that is not known, infinite where physics
-        refuses what is stated.
+    margin : misfit as declared over that of the proposal; 1 if unknown, infinite if the declaration is
+    physically impossible.
     """
 
     kind: SetupMistake
@@ -41,28 +41,31 @@ class SetupRepair:
 
     @property
     def is_sure(self) -> bool:
-        """Whether it fits better by a measured `margin`, so that an analysis without it would be wrong.
+        """Whether the proposal fits better by a measured `margin`, so that an analysis without it would be
+        wrong.
 
-        Units that physics refuses have none: they are errors of the quality report.
+        Physically impossible units have no margin: they are errors of the quality report.
         """
         return self.can_be_applied and 1.0 < self.margin < inf
 
     @property
     def can_be_applied(self) -> bool:
-        """Whether it says what to do."""
+        """Whether the proposal contains a correction."""
         return bool(self.segments or self.corrections or self.mounting)
 
     def tell(self, severity: Literal["warning", "error"]) -> Notice:
-        """The notice that says what is wrong and what would put it right."""
+        """Notice with the mistake and its correction."""
         todo = (
             "A repair is proposed; confirm it and analyse again."
             if self.can_be_applied
             else "What would put it right cannot be said; check the set-up of the sensors."
         )
-        return Notice("setup_wrong", " ".join((*self.evidence, todo)), severity=severity)
+        return Notice("setup_wrong", join_messages(*self.evidence, todo), severity=severity)
 
     def complete_manifest(self, manifest: Mapping[str, Any]) -> dict[str, Any]:
-        """A manifest with this repair; what else it says stays, earlier corrections come first."""
+        """Manifest with this correction added; other entries are kept, earlier corrections are applied
+        first.
+        """
         said = dict(manifest)
         if self.segments:
             others = {d: s for d, s in (said.get("sensors") or {}).items() if s is None}
@@ -87,7 +90,7 @@ class SetupRepair:
         return said
 
     def to_json(self) -> dict[str, object]:
-        """Plain values; `repair` is what a manifest would say of it, None where nobody knows."""
+        """JSON-serialisable values; `repair` is the correction as a manifest, None if unknown."""
         return {
             "kind": self.kind,
             "evidence": list(self.evidence),

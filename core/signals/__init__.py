@@ -1,1 +1,1 @@
-"""What was recorded, and how signals are filtered, searched and kept in memory."""
+"""Recordings and signals, and their filtering, peak detection and storage."""

@@ -1,4 +1,4 @@
-"""What calibration gives: how each sensor sits on its segment, and the bias of its gyroscope."""
+"""Result of calibration: sensor-to-segment alignment and gyroscope bias of each sensor."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class SegmentCalibration:
     ----------
     R_segment_sensor : (3, 3) maps sensor coordinates to ISB segment coordinates.
     gyro_bias : (3,) rad/s, sensor frame, mean over rest.
-    rest_norm : |acc| at rest, m/s²; without rest the mean specific force of the walk.
-    method : how the heading was found: "walking_direction", "gyro_pca", "declared", "neighbour".
-    score : 0 (guess) to 1 (certain); the method's own quality measure, documented there.
-    forward_sd : standard deviation of the anterior axis about the vertical, rad; None where not measured.
-    start_q : (4,) sensor to W in the middle of `Calibration.zero`; None = neutral, as who stands is.
+    rest_norm : |acc| at rest, m/s²; without rest the mean specific force of the walk. method : how the
+        heading was determined: "walking_direction", "gyro_pca", "declared", "neighbour".
+    score : 0 (guess) to 1 (certain); quality measure of the method, documented there.
+    forward_sd : standard deviation of the anterior axis about the vertical, rad; None if not measured.
+    start_q : (4,) sensor to W in the middle of `Calibration.zero`; None = neutral, as in standing.
     """
 
     R_segment_sensor: Floats
@@ -39,16 +39,16 @@ class SegmentCalibration:
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """All sensors of a take.
+    """All sensors of a recording.
 
     Parameters
     ----------
-    rest, walking : windows that were used; `walking` may be several straight parts. `rest` is empty where
-        nobody stood still.
+    rest, walking : windows used; `walking` may consist of several straight parts. `rest` is empty without
+        quiet standing.
     zero : window whose mean joint angles are subtracted: standing, or a straight part of the walk.
     turning : (n,) mask on the uniform axis, True while turning.
-    straight_steps : in `walking`, about; None without a leg sensor or a walk.
-    posture : what is neutral.
+    straight_steps : approximate number in `walking`; None without a leg sensor or a walk. posture : the
+        posture defined as neutral.
     """
 
     segments: Mapping[Segment, SegmentCalibration]
@@ -65,7 +65,7 @@ class Calibration:
 
 @dataclass(frozen=True, eq=False)
 class CalibratedRecording:
-    """A uniform recording and how its sensors sit."""
+    """A uniform recording with the alignment of its sensors."""
 
     recording: UniformRecording
     calibration: Calibration

@@ -1,7 +1,7 @@
-"""What a sensor's values are multiplied by and which axes they belong to, where its file says it wrongly.
+"""Correction of factors and axes of a sensor whose file is wrong.
 
-A correction is part of what somebody declares about a take (docs/reference/formats.md, "The manifest"); the
-files stay as they came.
+A correction is part of the declarations on a recording (docs/reference/formats.md, "The manifest"); the files
+are never modified.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY, Floats
+from sagittal.core.message import Message
 
 AXES: Final = ("x", "y", "z")
 AS_READ: Final[tuple[str, ...]] = AXES
@@ -38,8 +39,8 @@ class SensorCorrection:
 
     Parameters
     ----------
-    acc_axes, gyr_axes : for each of the right x, y and z the axis as read that shows it, such as
-        ("-y", "x", "z"). acc_times, gyr_times : factors, such as 9.80665 where g was read as m/s².
+    acc_axes, gyr_axes : for each of the correct x, y and z the corresponding axis as read, such as ("-y",
+        "x", "z"). acc_times, gyr_times : factors, such as 9.80665 if g was read as m/s².
 
     Raises
     ------
@@ -57,14 +58,22 @@ class SensorCorrection:
             if sorted(a.removeprefix("-") for a in axes) != list(AXES):
                 raise ParameterError(
                     "correction_implausible",
-                    f"{name} is {list(axes)}; expected x, y and z once each, with or without a minus: "
-                    '["-y", "x", "z"].',
+                    Message(
+                        '{name} is {axes}; expected x, y and z once each, with or without a minus: ["-y", '
+                        '"x", "z"].',
+                        name=name,
+                        axes=list(axes),
+                    ),
                 )
         for name in ("acc_times", "gyr_times"):
             if not 1e-4 <= getattr(self, name) <= 1e4:
                 raise ParameterError(
                     "correction_implausible",
-                    f"{name} is {getattr(self, name):g}; expected a factor from 0.0001 to 10000.",
+                    Message(
+                        "{name} is {self:g}; expected a factor from 0.0001 to 10000.",
+                        name=name,
+                        self=getattr(self, name),
+                    ),
                 )
 
     @property
@@ -73,15 +82,15 @@ class SensorCorrection:
         return self.acc_axes != AS_READ or self.gyr_axes != AS_READ
 
     def correct_acc(self, acc: Floats) -> Floats:
-        """Specific force (n, 3) in m/s² along the right axes."""
+        """Specific force (n, 3) in m/s² in the correct axes."""
         return acc @ (self.acc_times * to_axes_matrix(self.acc_axes)).T
 
     def correct_gyr(self, gyr: Floats) -> Floats:
-        """Angular rate (n, 3) in rad/s along the right axes."""
+        """Angular rate (n, 3) in rad/s in the correct axes."""
         return gyr @ (self.gyr_times * to_axes_matrix(self.gyr_axes)).T
 
     def follow(self, first: SensorCorrection) -> SensorCorrection:
-        """The correction that does what `first` does and then what this one does."""
+        """The composition: first `first`, then this correction."""
         acc = to_axes_matrix(self.acc_axes) @ to_axes_matrix(first.acc_axes)
         gyr = to_axes_matrix(self.gyr_axes) @ to_axes_matrix(first.gyr_axes)
         return SensorCorrection(
@@ -92,7 +101,7 @@ class SensorCorrection:
         )
 
     def to_json(self) -> dict[str, object]:
-        """As a manifest has it; what stays as read is left out."""
+        """In the form of a manifest; unchanged items are omitted."""
         said: dict[str, object] = {
             name: list(getattr(self, name))
             for name in ("acc_axes", "gyr_axes")
@@ -103,7 +112,7 @@ class SensorCorrection:
         }
 
     def say(self) -> str:
-        """What it does, in words, "nothing" where it changes nothing.
+        """Description in words, "nothing" without any change.
 
         >>> SensorCorrection(gyr_times=0.017453292519943295).say()
         'its rates are taken as degrees per second'
@@ -140,6 +149,6 @@ def to_axes_matrix(axes: Sequence[str]) -> Floats:
 
 
 def name_axes(matrix: Floats) -> tuple[str, ...]:
-    """The names for a signed permutation (3, 3): the opposite of `to_axes_matrix`."""
+    """The axis names of a signed permutation (3, 3): the inverse of `to_axes_matrix`."""
     columns = np.argmax(np.abs(matrix), axis=1)
     return tuple(("-" if matrix[row, c] < 0.0 else "") + AXES[c] for row, c in enumerate(columns))

@@ -1,7 +1,7 @@
 """Zero-phase low-pass of whole signals.
 
-`low_pass` is what SciPy's `butter` and `sosfiltfilt` give, to the bit. That package brings statistics,
-optimisation and interpolation along, 50 MB and half a second in every process that analyses.
+`low_pass` is bit-identical to SciPy's `butter` and `sosfiltfilt`, whose package imports statistics,
+optimisation and interpolation, 50 MB and half a second in every analysis process.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ POLE: Final = -np.exp(-0.25j * pi)
 
 @lru_cache(maxsize=64)
 def _design(cutoff_hz: float, rate_hz: float) -> tuple[Floats, Floats]:
-    """Second-order section b0, b1, b2, a1, a2 (5,), and the state (2,) in which a constant 1 stays 1.
+    """Second-order section b0, b1, b2, a1, a2 (5,), and its steady state (2,) for a constant input of 1.
 
-    A stream asks for the same ones again and again.
+    Cached, since a stream requests the same ones repeatedly.
     """
     warped = 4.0 * np.tan(pi * min(0.99, cutoff_hz / (0.5 * rate_hz)) / 2.0)
     analog = warped * np.array([POLE, np.conj(POLE)])
@@ -37,11 +37,11 @@ def _design(cutoff_hz: float, rate_hz: float) -> tuple[Floats, Floats]:
 
 
 def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None) -> Floats:
-    """Butterworth of second order forwards and backwards along the last axis of x (..., n), n ≥ 1.
+    """Second-order Butterworth filter forwards and backwards along the last axis of x (..., n), n ≥ 1.
 
     Parameters
     ----------
-    pad : samples by which the ends are continued, None = `PAD_S`.
+    pad : number of samples by which the ends are extended, None = `PAD_S`.
     """
     from sagittal.core.signals.kernel import filter_both_ways
 
@@ -64,12 +64,13 @@ REACHES: Final = 8
 
 
 def smooth_gaussian(x: Floats, sd: float) -> Floats:
-    """Gaussian mean of x (n,), n ≥ 1, the ends held: SciPy's `gaussian_filter1d`, mode "nearest".
+    """Gaussian smoothing of x (n,), n ≥ 1, with constant extension: SciPy's `gaussian_filter1d`, mode
+    "nearest".
 
-    Up to `sd` of a thousand samples it is that to 1e-14 of the largest sample of a piece.
+    For `sd` up to a thousand samples the difference is below 1e-14 of the largest sample of a block.
 
-    SciPy adds up 1600 products for each sample where `sd` is 200 samples; here pieces go by way of their
-    spectra. A sample that is no number spoils the one or two pieces that read it, and no more.
+    SciPy sums 1600 products for each sample with an `sd` of 200 samples; here blocks are convolved through
+    their spectra. A non-finite sample affects only the one or two blocks that include it.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Compilation of functions that only other compiled functions call, as far as Numba is known to allow it."""
+"""Compilation of functions called only from other compiled functions, as far as Numba supports it."""
 
 from __future__ import annotations
 
@@ -21,15 +21,14 @@ if IS_TESTED:
     from numba.core.registry import CPUDispatcher
 
     class InnerDispatcher(CPUDispatcher):  # type: ignore[misc]
-        """A compiled function without an entry point for Python; compiled callers use it as any other."""
+        """A compiled function without an entry point for Python; compiled callers use it like any other."""
 
         def __call__(self, *args: object, **kwargs: object) -> NoReturn:
-            """Refuse a call from Python, for which there is no machine code to jump to.
+            """Reject a call from Python, for which there is no machine code.
 
             Raises
             ------
-            TypeError
-                Always.
+            TypeError Always.
             """
             name = f"{self.py_func.__module__}.{self.py_func.__qualname__}"
             raise TypeError(
@@ -41,12 +40,12 @@ if IS_TESTED:
 def inner_njit(**options: bool | str) -> Callable[[Callable[..., Any]], Any]:
     """Return a decorator like `numba.njit` that compiles no entry points for Python and C.
 
-    Each entry point would be compiled by itself, for every function and every signature. A call from Python
+    Each entry point would be compiled separately, for every function and every signature. A call from Python
     raises TypeError (`InnerDispatcher`); without its `__call__` the interpreter would crash.
 
     Parameters
     ----------
-    options : of `numba.njit`, in addition to those that all our loops share.
+    options : of `numba.njit`, in addition to those common to all our loops.
     """
     if not IS_TESTED:
         ordinary: Callable[[Callable[..., Any]], Any] = numba.njit(cache=True, nogil=True, **options)

@@ -1,10 +1,8 @@
-"""Compiled loops of `filtering`, `peaks` and `rest`.
+"""Compiled loops of `filtering`, `peaks` and `rest`: forward-backward filtering of rows, peaks, and
+statistics of the window around every sample.
 
-They run over a row forwards and backwards, over its tops, and over what a sensor measured in the window
-around every sample.
-
-The filtered numbers are those of SciPy's `sosfiltfilt` to the bit, in a third of its time and without its
-five copies.
+Filtered values are bit-identical to SciPy's `sosfiltfilt`, in a third of its time and without its five
+copies.
 """
 
 from __future__ import annotations
@@ -22,8 +20,8 @@ def filter_both_ways(rows, section, start, pad, room, out):  # type: ignore[no-u
 
     Parameters
     ----------
-    section : (5,) b0 b1 b2 a1 a2. start : (2,) its state under a constant 1. pad : < n, numbers by which
-        the ends are continued by their point reflection. room : (n + 2 pad,) scratch.
+    section : (5,) b0 b1 b2 a1 a2. start : (2,) its steady state for a constant input of 1. pad : < n, length
+        by which the ends are extended by point reflection. room : (n + 2 pad,) scratch.
     """
     n, whole = rows.shape[1], len(room)
     b0, b1, b2, a1, a2 = section[0], section[1], section[2], section[3], section[4]
@@ -52,13 +50,13 @@ def filter_both_ways(rows, section, start, pad, room, out):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def find_lows(end, level, valleys, higher, lows):  # type: ignore[no-untyped-def]
-    """Write the lowest point (k,) behind each top until something higher comes, or the end.
+    """Write the minimum (k,) between each peak and the last higher one before it, or the first sample.
 
     Parameters
     ----------
-    end : where the signal ends behind the first top. level : (k,) of the tops. valleys : (k,) lowest point
-        between each and the one behind it. higher : (k + 1, 2) scratch: what has nothing higher before it,
-        with its own lowest point.
+    end : value of the first sample. level : (k,) of the peaks in order. valleys : (k,) minimum between each
+        and the previous one. higher : (k + 1, 2) scratch: stack of peaks not yet exceeded, with their
+        minimum.
     """
     higher[0, 0] = higher[0, 1] = end
     count = 1
@@ -76,7 +74,7 @@ def find_lows(end, level, valleys, higher, lows):  # type: ignore[no-untyped-def
 def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-untyped-def]
     """Write which windows (n − width + 1,) have no lost sample, and the mean rate (3,) of the steadiest one.
 
-    Without any it is the first one's. Sums are differences of running sums, as `np.cumsum` has them.
+    Without any that of the first one. Sums are differences of running sums, as from `np.cumsum`.
 
     Parameters
     ----------
@@ -109,7 +107,7 @@ def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-unty
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def measure_norms(x, offset, out):  # type: ignore[no-untyped-def]
-    """Write the norms (n,) of vectors x (n, 3) less an offset (3,)."""
+    """Write the norms (n,) of vectors x (n, 3) minus an offset (3,)."""
     for k in range(len(x)):
         a, b, c = x[k, 0] - offset[0], x[k, 1] - offset[1], x[k, 2] - offset[2]
         out[k] = sqrt(a * a + b * b + c * c)
@@ -117,7 +115,9 @@ def measure_norms(x, offset, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def measure_windows(x, width, mean, sd):  # type: ignore[no-untyped-def]
-    """Write mean and standard deviation (n,) of x (n,) in the window around every sample, borders held."""
+    """Write mean and standard deviation (n,) of x (n,) in the window around every sample, constant at the
+    borders.
+    """
     n, half = len(x), width // 2
     before = until = square_before = square_until = 0.0
     for k in range(n):

@@ -1,7 +1,7 @@
-"""Memory that goes back to the machine: arrays with pages of their own, and what the C library keeps.
+"""Returning memory to the operating system: arrays with separate pages, and memory retained by the C library.
 
-What the C library frees it keeps for the next array: large ones that die one after the other while another
-one grows would be in memory together with it.
+The C library keeps freed memory for later allocations: large arrays that are freed one after the other while
+another one grows would all remain resident.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from sagittal.core.frames import Floats
 
 
 def make_pages(*shape: int) -> Floats:
-    """Zeros of a shape, not empty, whose memory goes back as soon as nobody holds them.
+    """Zeros of a non-empty shape, in pages returned to the operating system as soon as they are unreferenced.
 
-    What is never written takes none.
+    Pages never written to take no memory.
     """
     count = math.prod(shape)
     size = 8 * max(1, count)  # a map of nothing cannot be made
@@ -32,9 +32,9 @@ def make_pages(*shape: int) -> Floats:
 
 
 def give_memory_back() -> None:
-    """Give freed memory back to the machine; where the C library cannot, nothing happens.
+    """Return freed memory to the operating system; no effect if the C library does not support it.
 
-    glibc keeps what lies below memory that is in use: after reading an hour of seven sensors 190 MB.
+    glibc retains memory below allocations in use: 190 MB after reading an hour of seven sensors.
     """
     trim = _find_trim()
     if trim is not None:

@@ -1,4 +1,4 @@
-"""Peaks of a signal: what SciPy's `find_peaks` gives, without the 50 MB that its package brings along."""
+"""Peaks of a signal: equivalent to SciPy's `find_peaks`, without importing its package (50 MB)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def find_peaks(
 
     Parameters
     ----------
-    height : least value. distance : least samples between two, ≥ 1; of nearer ones the higher stays.
-    prominence : least way down from a peak before something higher comes, on either side, of those that the
-        other two leave.
+    height : minimum value. distance : minimum number of samples between two, ≥ 1; of closer ones the higher
+        is kept. prominence : minimum descent from a peak before a higher value, on either side, applied after
+        the other two.
     """
     if len(x) < 3:
         return np.zeros(0, np.int64)
@@ -33,7 +33,7 @@ def find_peaks(
 
 
 def _list_tops(x: Floats) -> NDArray[np.int64]:
-    """Samples above both sides; of several that are equal the middle one."""
+    """Samples above both sides; of a plateau the middle one."""
     first = np.flatnonzero(np.concatenate(([True], x[1:] != x[:-1])))
     last = np.append(first[1:], len(x)) - 1
     level = x[first]
@@ -43,7 +43,7 @@ def _list_tops(x: Floats) -> NDArray[np.int64]:
 
 
 def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools:
-    """Which stay where the highest first takes all nearer than `distance` away."""
+    """Mask of the peaks kept if the highest removes all closer than `distance` first."""
     stays = np.ones(len(peaks), np.bool_)
     first = np.searchsorted(peaks, peaks - distance, "right")
     end = np.searchsorted(peaks, peaks + distance, "left")
@@ -55,7 +55,7 @@ def _keep_apart(peaks: NDArray[np.int64], level: Floats, distance: int) -> Bools
 
 
 def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
-    """How far each of all tops (k,) is above the higher of the lowest points before something higher."""
+    """Height of all peaks (k,) above the higher of the minima before a higher value on either side."""
     from sagittal.core.signals.kernel import find_lows
 
     level, higher = x[tops].astype(np.float64), np.empty((len(tops) + 1, 2))
@@ -68,5 +68,5 @@ def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
 
 
 def compile_peak_kernel() -> None:
-    """Compile the kernel or load it, so that the first take does not wait for it."""
+    """Compile the kernel or load it from the cache, so that the first recording is not delayed."""
     find_peaks(np.array([0.0, 1.0, 0.0]), height=0.0, distance=1.0, prominence=0.0)

@@ -1,7 +1,8 @@
-"""What was recorded: frozen objects, checked once at construction, SI units.
+"""Recordings: frozen objects, validated at construction, SI units.
 
-`Recording` is what the files say (each sensor on its own clock); `UniformRecording` is the same take on
-one time axis with a validity mask per sensor (made by core/timeline). All later stages work on the latter.
+`Recording` is the content of the files (each sensor on its own clock); `UniformRecording` is the same
+recording on one time axis with a validity mask per sensor (made by core/timeline). All later stages use the
+latter.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice, ParameterError, SignalError
 from sagittal.core.frames import PROTOCOLS, SEGMENTS, Bools, Floats, Protocol, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import HoldsSamples, hold_samples
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 from sagittal.core.subject.anthropometry import BodyMeasures
@@ -23,13 +25,22 @@ from sagittal.core.subject.standing_angles import check_standing
 
 
 def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
-    """Check shape and type of an array once and lock it against writing."""
+    """Check shape and type of an array once and make it read-only."""
     if a is None:
         return
     if a.ndim != len(shape) or any(
         want is not None and got != want for got, want in zip(a.shape, shape, strict=True)
     ):
-        raise ParameterError("bad_shape", f"{where}: {name} has shape {a.shape}, expected {shape}.")
+        raise ParameterError(
+            "bad_shape",
+            Message(
+                "{where}: {name} has shape {shape}, expected {shape2}.",
+                where=where,
+                name=name,
+                shape=a.shape,
+                shape2=shape,
+            ),
+        )
     a.setflags(write=False)
 
 
@@ -38,7 +49,7 @@ BELT_MPS: Final = (0.05, 5.0)
 
 
 def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
-    """Refuse a belt speed that no treadmill has, or one without a treadmill.
+    """Reject an implausible belt speed, or one without a treadmill.
 
     Raises
     ------
@@ -49,28 +60,36 @@ def check_belt(belt_speed_mps: float | None, protocol: Protocol) -> None:
     if not BELT_MPS[0] <= belt_speed_mps <= BELT_MPS[1]:
         raise ParameterError(
             "belt_speed_implausible",
-            f"Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS[0]:g} to {BELT_MPS[1]:g} m/s; give it "
-            "in metres per second (3.6 km/h is 1 m/s).",
+            Message(
+                "Belt speed {belt_speed_mps:g} m/s is outside {BELT_MPS:g} to {BELT_MPS2:g} m/s; "
+                "give it in metres per second (3.6 km/h is 1 m/s).",
+                belt_speed_mps=belt_speed_mps,
+                BELT_MPS=BELT_MPS[0],
+                BELT_MPS2=BELT_MPS[1],
+            ),
         )
     if protocol != "treadmill":
         raise ParameterError(
             "belt_speed_without_treadmill",
-            f"A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or leave the "
-            "speed out.",
+            Message(
+                "A belt speed is given, but the protocol is '{protocol}'; set it to treadmill or "
+                "leave the speed out.",
+                protocol=protocol,
+            ),
         )
 
 
 @dataclass(frozen=True)
 class Subject:
-    """Who was measured; None where nobody said.
+    """The person measured; None for items not given.
 
     Parameters
     ----------
     height_m : body height, 0.5 to 2.5 m.
-    standing_width_m : between the middles of the ankles while standing at the beginning, 0 to 0.8 m.
-    standing_angles_deg : joint angles in that standing by goniometer, names as
+    standing_width_m : distance between the ankle centres in initial standing, 0 to 0.8 m.
+        standing_angles_deg : goniometer joint angles in that posture, names as
         `sagittal.core.subject.standing_angles.NAMES`.
-    shoe : the shape of its sole. measures : lengths of the body by tape.
+    shoe : the shape of its sole. measures : tape-measured body lengths.
     """
 
     height_m: float | None = None
@@ -83,19 +102,25 @@ class Subject:
         if self.height_m is not None and not 0.5 <= self.height_m <= 2.5:
             raise ParameterError(
                 "height_implausible",
-                f"Body height {self.height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+                Message(
+                    "Body height {height_m:g} m is outside 0.5 to 2.5 m; give it in metres.",
+                    height_m=self.height_m,
+                ),
             )
         if self.standing_width_m is not None and not 0.0 <= self.standing_width_m <= 0.8:
             raise ParameterError(
                 "standing_width_implausible",
-                f"Ankles {self.standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
-                "distance of their middles in metres.",
+                Message(
+                    "Ankles {standing_width_m:g} m apart while standing is outside 0 to 0.8 m; give the "
+                    "distance of their middles in metres.",
+                    standing_width_m=self.standing_width_m,
+                ),
             )
         check_standing(self.standing_angles_deg)
         object.__setattr__(self, "standing_angles_deg", MappingProxyType(dict(self.standing_angles_deg)))
 
     def complete_from(self, other: Subject) -> Subject:
-        """What is known here, and from `other` what is not."""
+        """This subject, with missing items taken from `other`."""
         height, width = self.height_m, self.standing_width_m
         return Subject(
             other.height_m if height is None else height,
@@ -119,20 +144,20 @@ class Subject:
 @hold_samples("acc", "gyr", "mag", "quat")
 @dataclass(frozen=True, eq=False)
 class ImuStream(HoldsSamples):
-    """One sensor as its file gives it, in SI units, on its own clock; missing samples are NaN rows.
+    """One sensor as given in its file, in SI units, on its own clock; missing samples are NaN rows.
 
     Parameters
     ----------
     device_id : serial number or column label, unique in a recording.
-    source : name of the file it came from.
+    source : name of its file.
     t_s : (n,) seconds, strictly increasing. From a packet counter (unwrapped) or the device clock.
         Streams of one recording that share `clock` share the origin of `t_s`.
     acc : (n, 3) specific force, m/s². gyr : (n, 3) rad/s or None. mag : (n, 3) any unit or None.
-    quat : (n, 4) vendor orientation, scalar first, kept for comparison only, or None.
+    quat : (n, 4) vendor orientation, scalar first, for comparison only, or None.
     rate_hz : nominal sampling rate.
-    clock : what `t_s` was made from: "counter" (shared packet counter), "device" (own clock), "index".
-    digest : made of the signal values, to find the same stream under two ids.
-    notices : what the reader had to decide or could not read.
+    clock : source of `t_s`: "counter" (shared packet counter), "device" (own clock), "index".
+    digest : of the signal values, to detect the same stream under two ids. notices : assumptions and problems
+        of the reader.
     """
 
     device_id: str
@@ -150,7 +175,9 @@ class ImuStream(HoldsSamples):
     def __post_init__(self) -> None:
         n = len(self.t_s)
         if n == 0:
-            raise SignalError("empty", f"“{self.source}”: no samples.", sensor=self.device_id)
+            raise SignalError(
+                "empty", Message("“{source}”: no samples.", source=self.source), sensor=self.device_id
+            )
         for name, a, shape in (
             ("t_s", self.t_s, (n,)),
             ("acc", self.held("acc"), (n, 3)),
@@ -161,17 +188,19 @@ class ImuStream(HoldsSamples):
             _frozen(a, name, shape, self.source)
         if np.any(self.t_s[1:] <= self.t_s[:-1]):
             raise SignalError(
-                "time_not_increasing", f"“{self.source}”: time does not increase.", sensor=self.device_id
+                "time_not_increasing",
+                Message("“{source}”: time does not increase.", source=self.source),
+                sensor=self.device_id,
             )
 
 
 @dataclass(frozen=True)
 class GivenLimits:
-    """When a person says that a functional test began and ended, s; None = as it is found.
+    """Manually given start and end of a functional test, s; None = as detected.
 
     Raises
     ------
-    ParameterError `test_limits` where a time is below 0 or the end is not after the start.
+    ParameterError `test_limits` if a time is below 0 or the end is not after the start.
     """
 
     start_s: float | None = None
@@ -182,8 +211,12 @@ class GivenLimits:
         if any(not 0.0 <= t < float("inf") for t in times) or times != sorted(set(times)):
             raise ParameterError(
                 "test_limits",
-                f"A test from {self.start_s} s to {self.end_s} s; expected times of 0 or more, the end after "
-                "the start.",
+                Message(
+                    "A test from {start_s} s to {end_s} s; expected times of 0 or more, the end after the "
+                    "start.",
+                    start_s=self.start_s,
+                    end_s=self.end_s,
+                ),
             )
 
 
@@ -192,7 +225,7 @@ BLOCK_ROWS: Final = 1 << 16
 
 
 def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
-    """A stream that is in memory, read in blocks of so many rows."""
+    """A stream in memory, read in blocks of this many rows."""
 
     def open_blocks() -> Iterator[SampleBlock]:
         for i in range(0, len(stream.t_s), rows):
@@ -213,17 +246,17 @@ def as_long_stream(stream: ImuStream, rows: int = BLOCK_ROWS) -> LongStream:
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One take: streams by device id and which segment each is worn on.
+    """One recording: streams by device id, and the segment of each.
 
     Parameters
     ----------
     streams : device id → stream.
     segments : device id → segment, None = not used. Ids without an entry are unassigned (see `unassigned`).
-    mounting : segment → declared mounting, free text ("sacrum, face backwards").
+    mounting : segment → declared placement, free text ("sacrum, face backwards").
     sha256 : file name → sha256 of the source bytes.
     belt_speed_mps : of a treadmill, None = not entered.
-    test_limits : of a functional test, as a person corrected them.
-    long : device id → sensor that is read block by block; such a sensor need not be among the streams.
+    test_limits : of a functional test, corrected manually.
+    long : device id → sensor read block by block, which may be missing among the streams.
     """
 
     streams: Mapping[str, ImuStream]
@@ -241,7 +274,12 @@ class Recording:
         check_belt(self.belt_speed_mps, self.protocol)
         if self.protocol not in PROTOCOLS:
             raise ParameterError(
-                "unknown_protocol", f"Protocol '{self.protocol}' is not one of {', '.join(PROTOCOLS)}."
+                "unknown_protocol",
+                Message(
+                    "Protocol '{protocol}' is not one of {PROTOCOLS}.",
+                    protocol=self.protocol,
+                    PROTOCOLS=", ".join(PROTOCOLS),
+                ),
             )
         worn: dict[str, str] = {}
         for device, segment in self.segments.items():
@@ -250,13 +288,23 @@ class Recording:
             if segment not in SEGMENTS:
                 raise ParameterError(
                     "unknown_segment",
-                    f"Sensor {device} is mapped to '{segment}'; expected {', '.join(SEGMENTS)} or null.",
+                    Message(
+                        "Sensor {device} is mapped to '{segment}'; expected {SEGMENTS} or null.",
+                        device=device,
+                        segment=segment,
+                        SEGMENTS=", ".join(SEGMENTS),
+                    ),
                     sensor=device,
                 )
             if segment in worn:
                 raise ParameterError(
                     "duplicate_segment",
-                    f"Sensors {worn[segment]} and {device} are both mapped to {segment}; choose one.",
+                    Message(
+                        "Sensors {segment} and {device} are both mapped to {segment2}; choose one.",
+                        segment=worn[segment],
+                        device=device,
+                        segment2=segment,
+                    ),
                     sensor=device,
                 )
             worn[segment] = device
@@ -265,7 +313,7 @@ class Recording:
 
     @property
     def unassigned(self) -> tuple[str, ...]:
-        """Device ids that nobody has mapped or set aside."""
+        """Device ids neither assigned to a segment nor excluded."""
         return tuple(d for d in dict.fromkeys((*self.streams, *self.long)) if d not in self.segments)
 
 
@@ -301,13 +349,15 @@ class SensorSignals(HoldsSamples):
             _frozen(a, name, shape, self.device_id)
         if not (np.isfinite(acc).all() and np.isfinite(gyr).all()):
             raise SignalError(
-                "bad_signal", f"{self.device_id}: non-finite samples left.", sensor=self.device_id
+                "bad_signal",
+                Message("{device_id}: non-finite samples left.", device_id=self.device_id),
+                sensor=self.device_id,
             )
 
 
 @dataclass(frozen=True, eq=False)
 class UniformRecording:
-    """A take on one uniform time axis, by segment.
+    """A recording on one uniform time axis, by segment.
 
     Parameters
     ----------
@@ -330,7 +380,12 @@ class UniformRecording:
             if len(s.valid) != len(self.t_s):
                 raise ParameterError(
                     "bad_shape",
-                    f"{segment} has {len(s.valid)} samples, the axis {len(self.t_s)}.",
+                    Message(
+                        "{segment} has {valid} samples, the axis {t_s}.",
+                        segment=segment,
+                        valid=len(s.valid),
+                        t_s=len(self.t_s),
+                    ),
                     sensor=segment,
                 )
         object.__setattr__(self, "sensors", MappingProxyType(dict(self.sensors)))

@@ -1,9 +1,10 @@
-"""Where the sensors are at rest: quiet windows anywhere in a take, for all sensors together or for one.
+"""Detection of rest: quiet windows anywhere in a recording, for all sensors together or for one.
 
-A sample is quiet when the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
+A sample is quiet if the 1-s window around it has mean |ω − b| below 6 °/s and std |f| below 0.25 m/s²
 (docs/science/calibration.md, "Rest"). b is the sensor's own offset, taken from its steadiest window instead
-of the median of the take: in a take that is mostly walking the median is a property of the gait, not of the
-gyroscope. An offset above that limit, up to 20 °/s, counts where gravity shows that the sensor did not turn.
+of the median of the recording: in a recording of mostly walking the median is a property of the gait, not of
+the gyroscope. An offset above that limit, up to 20 °/s, is accepted if gravity shows that the sensor did not
+rotate.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Window = tuple[float, float]
 
 @dataclass(frozen=True)
 class QuietParams:
-    """What counts as quiet (docs/science/calibration.md, "Rest")."""
+    """Criteria for quiet samples (docs/science/calibration.md, "Rest")."""
 
     window_s: float = 1.0
     gyro_limit: float = radians(6.0)
@@ -37,14 +38,15 @@ class QuietParams:
 
 @dataclass(frozen=True)
 class RestParams(QuietParams):
-    """What counts as rest of a person (docs/science/calibration.md, "Rest", "False rests").
+    """Criteria for rest of a person (docs/science/calibration.md, "Rest", "False rests").
 
     Parameters
     ----------
-    drift, drift_rate : a rest over which the vertical turns further in a sensor, and faster, rad and rad/s,
-        is a slow movement. bias : a mean rate further from that of a longer rest, rad/s, is no bias of the
-        gyroscope, and that of the longer rest is taken. 6 °/s of mean rate let both pass: a lower back that
-        swayed for 2 s at the start of a real take had 2.9 °/s, and its heading was lost.
+    drift, drift_rate : a rest with a larger and faster rotation of the vertical in a sensor, rad and rad/s,
+        is a slow movement. bias : a mean rate that differs by more from that of a longer rest, rad/s, is not
+        the gyroscope bias, and that of the longer rest is used. A limit of 6 °/s on the mean rate misses
+        both: a lower back that swayed for 2 s at the start of a real recording had 2.9 °/s, and its heading
+        was lost.
     """
 
     drift: float = radians(1.0)
@@ -69,7 +71,7 @@ JUDGED: Final = radians(1.0)
 
 @dataclass(frozen=True, eq=False)
 class Quietness:
-    """How quiet one sensor is around each sample.
+    """Quietness of one sensor around each sample.
 
     Parameters
     ----------
@@ -83,7 +85,7 @@ class Quietness:
 
 
 def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParams | None = None) -> Quietness:
-    """Measure how quiet a sensor is in the window around every sample; borders hold the nearest window."""
+    """Quietness of a sensor in the window around every sample; borders use the nearest window."""
     params = params or QuietParams()
     width = max(2, round(params.window_s * rate_hz))
     if len(signals.valid) < width:
@@ -110,10 +112,10 @@ def measure_quietness(signals: SensorSignals, rate_hz: float, params: QuietParam
 
 
 def is_bias(offset: Floats, signals: SensorSignals, rate_hz: float, params: QuietParams) -> bool:
-    """Is a steady rate above `gyro_limit` an offset of the gyroscope and not a turn of the sensor?
+    """Whether a steady rate above `gyro_limit` is a gyroscope offset and not a rotation of the sensor.
 
-    A turn about a horizontal axis turns gravity in the sensor's axes; one about the vertical does not, but is
-    not repeated at the same rate after the sensor has moved.
+    A rotation about a horizontal axis changes gravity in sensor axes; one about the vertical does not, but
+    does not recur with the same rate after the sensor has moved.
 
     Parameters
     ----------
@@ -144,9 +146,9 @@ def find_rest_windows(
     params: QuietParams | None = None,
     segments: Iterable[Segment] | None = None,
 ) -> tuple[Window, ...]:
-    """Windows in which all sensors (or those of `segments`) are at rest together, in order of time.
+    """Windows with all sensors (or those of `segments`) at rest together, in chronological order.
 
-    The quarter window at each end of a run that may already hold the onset of movement is left out.
+    The quarter window at each end of a run that may already include the onset of movement is excluded.
     """
     params = params or QuietParams()
     chosen = tuple(recording.sensors if segments is None else segments)
@@ -161,20 +163,22 @@ def find_rest_windows(
 def drop_false_rests(
     recording: UniformRecording, rests: tuple[Window, ...], params: RestParams | None = None
 ) -> tuple[Window, ...]:
-    """The rests in which no sensor's vertical turns: the others are slow movements."""
+    """The rests without rotation of any sensor's vertical: the others are slow movements."""
     params, rate = params or RestParams(), recording.rate_hz
     sensors = recording.sensors.values()
     return tuple(r for r in rests if not any(is_drifting(x, r, rate, params) for x in sensors))
 
 
 def is_drifting(signals: SensorSignals, window: Window, rate_hz: float, params: RestParams) -> bool:
-    """Does the vertical turn in a sensor between the ends of a window, a quarter of a second to one each?"""
+    """Whether the vertical rotates in a sensor between the ends of a window, each a quarter of a second to
+    one second long.
+    """
     turned = measure_turn(signals.cut("acc", index_window(window, rate_hz)), rate_hz)
     return turned[0] > params.drift and turned[0] > params.drift_rate * turned[1]
 
 
 def measure_turn(acc: Floats, rate_hz: float) -> tuple[float, float]:
-    """Angle in rad by which the mean force (n, 3) differs at the ends of a rest, and the seconds between."""
+    """Angle in rad between the mean forces (n, 3) at the ends of a rest, and the seconds between."""
     edge = max(1, min(len(acc) // 4, round(rate_hz)))
     a, b = acc[:edge].mean(axis=0), acc[-edge:].mean(axis=0)
     turned = float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
@@ -182,7 +186,7 @@ def measure_turn(acc: Floats, rate_hz: float) -> tuple[float, float]:
 
 
 def find_windows(quiet: Bools, rate_hz: float, params: QuietParams | None = None) -> tuple[Window, ...]:
-    """Turn a mask (n,) of quiet window centres into rest windows of at least `shortest_s`."""
+    """Convert a mask (n,) of quiet window centres to rest windows of at least `shortest_s`."""
     params = params or QuietParams()
     n = len(quiet)
     reach = round(0.25 * params.window_s * rate_hz)
@@ -195,11 +199,11 @@ def find_windows(quiet: Bools, rate_hz: float, params: QuietParams | None = None
 
 
 def count_runs(mask: Bools, before: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Samples in a row (T, n), this one included, up to each of a block of a mask (T, n).
+    """Consecutive true samples (T, n), including the current one, for each sample of a mask (T, n).
 
     Parameters
     ----------
-    before : (n,) of those so far, advanced in place.
+    before : (n,) count before the block, advanced in place.
     """
     if not len(mask):
         return np.zeros(mask.shape, np.int64)
@@ -231,19 +235,21 @@ def _average_windows(x: Floats, width: int) -> Floats:
 
 
 def _lock(x: A) -> A:
-    """The same array as a kernel takes it, which is compiled once: contiguous, not to be written."""
+    """The array in the form used by a kernel, which is compiled only once: contiguous, read-only."""
     locked = np.ascontiguousarray(x).view()
     locked.setflags(write=False)
     return locked
 
 
 def _centred(x: Bools, n: int, width: int) -> Bools:
-    """Place full-window values at the window centres of an axis of n samples, borders held."""
+    """Assign full-window values to the window centres of an axis of n samples, constant at the borders."""
     index = np.clip(np.arange(n) - width // 2, 0, len(x) - 1)
     return x[index]
 
 
 def compile_rest_kernels() -> None:
-    """Compile what `measure_quietness` calls or load it, so that the first take does not wait for it."""
+    """Compile the kernels of `measure_quietness` or load them from the cache, so that the first recording
+    is not delayed.
+    """
     valid = np.ones(2, np.bool_)
     measure_quietness(SensorSignals("", np.zeros((2, 3)), np.zeros((2, 3)), None, valid, ~valid), 1.0)

@@ -1,6 +1,6 @@
-"""A sensor's recording that is too long to hold: samples block by block, as often as asked.
+"""A sensor recording too long for memory: samples block by block, as often as requested.
 
-How long the blocks are says nothing: who reads them gives the same result however they are cut.
+Block lengths are arbitrary: readers must give the same result for any division.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from sagittal.core.signals.held_samples import is_complete
 
 @dataclass(frozen=True, eq=False)
 class SampleBlock:
-    """Successive samples of one sensor.
+    """Consecutive samples of one sensor.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ class SampleBlock:
 
 @dataclass(frozen=True, eq=False)
 class LongStream:
-    """One sensor whose samples are read when somebody goes through them.
+    """One sensor whose samples are read on iteration.
 
     Parameters
     ----------
-    rate_hz : nominal. duration_s : from first to last sample as the file declares it.
+    rate_hz : nominal. duration_s : from first to last sample as declared by the file.
     started_at : the device's own clock at the first sample, None without one.
-    open_blocks : begins at the first sample, every time it is called.
+    open_blocks : starts at the first sample in every call.
     """
 
     device_id: str
@@ -51,9 +51,9 @@ class LongStream:
 
 
 def find_complete_rows(block: SampleBlock) -> SampleBlock:
-    """The rows of a block in which every channel was measured.
+    """The rows of a block with all channels measured.
 
-    An acceleration of exactly zero on all axes is what a device writes when it does not measure.
+    An acceleration of exactly zero on all axes is written by devices when they do not measure.
     """
     good = is_complete(block.acc) & block.acc.any(axis=1)
     if block.gyr is not None:

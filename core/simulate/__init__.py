@@ -1,4 +1,6 @@
-"""Simulated walkers and sensors with exact truth, for tests, demo and CLI (docs/science/simulation.md)."""
+"""Simulated walkers and sensors with exact ground truth, for tests, demo and CLI
+(docs/science/simulation.md).
+"""
 
 from sagittal.core.simulate.chest import ChestSimulation, ChestTruth, PostureHold, simulate_day
 from sagittal.core.simulate.functional import (

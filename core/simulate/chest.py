@@ -1,9 +1,8 @@
-"""A sensor on the breastbone while a person sits, stands, lies and walks
-(docs/science/simulation.md, "Chest").
+"""A sensor on the sternum of a person who sits, stands, lies and walks (docs/science/simulation.md, "Chest").
 
-For the recognition of postures and of rising from a chair. It moves in one plane but for lying on a side; it
-does not turn, and it has not been compared with recordings of a chest. Stairs are level walking with the
-lean and the unrest of the trunk that the published figures ask for (docs/science/activity.md, "Stairs").
+For testing the recognition of postures and sit-to-stand transitions. Movement is in one plane except for
+lying on a side, without turns, and has not been compared with chest recordings. Stairs are level walking with
+the trunk lean and variability of published values (docs/science/activity.md, "Stairs").
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ Posture = Literal["stand", "sit", "lie", "walk", "lie_side", "stairs_up", "stair
 
 @dataclass(frozen=True)
 class HeldPosture:
-    """A posture of the reference person: height of the breastbone in m, trunk pitch (forward positive)."""
+    """A posture of the reference person: height of the sternum in m, trunk pitch (forward positive)."""
 
     height_m: float
     pitch_rad: float
@@ -90,12 +89,12 @@ STARTING_S: Final = 0.8
 
 @dataclass(frozen=True)
 class ChestStyle:
-    """How a person moves; the defaults are a healthy adult without breath.
+    """Movement style of a person; the defaults are a healthy adult without breathing.
 
     Parameters
     ----------
-    lean_rad : forward on the way up from a chair and down to it. change_s : duration of that. lying_s : of
-        lying down and getting up. bow_rad : of a bow. sway_m : to the sides with each stride.
+    lean_rad : forward lean in rising from a chair and sitting down. change_s : duration of these. lying_s :
+        duration of lying down and getting up. bow_rad : of a bow. sway_m : lateral, with each stride.
     """
 
     lean_rad: float = LEAN
@@ -107,7 +106,7 @@ class ChestStyle:
 
 @dataclass(frozen=True)
 class PostureHold:
-    """Stay in a posture, walk, or bow for so long; `steps_per_min` counts for walking and stairs."""
+    """A posture held, a walk, or a bow for a duration; `steps_per_min` applies to walking and stairs."""
 
     posture: Posture
     duration_s: float
@@ -119,13 +118,13 @@ Day = tuple[PostureHold, ...]
 
 @dataclass(frozen=True, eq=False)
 class ChestTruth:
-    """Exact truth at the samples of the recording.
+    """Exact ground truth at the samples of the recording.
 
     Parameters
     ----------
-    t_s : (n,). pitch_rad : (n,) of the trunk, forward positive. height_m, forward_m : (n,) of the breastbone.
-    phases : postures and the changes between them ("sit_to_stand" …) over the whole take.
-    steps_s : when each step of the walking has its highest point.
+    t_s : (n,). pitch_rad : (n,) of the trunk, forward positive. height_m, forward_m : (n,) of the sternum.
+        phases : postures and the transitions between them ("sit_to_stand" …) over the whole recording.
+        steps_s : time of the highest point of each step.
     """
 
     t_s: Floats
@@ -140,7 +139,7 @@ class ChestTruth:
 
 @dataclass(frozen=True, eq=False)
 class ChestSimulation(Recorded):
-    """A recording of one sensor on the chest and what really happened."""
+    """A recording of one sensor on the chest with its ground truth."""
 
     truth: ChestTruth
 
@@ -153,11 +152,11 @@ def simulate_day(
     style: ChestStyle | None = None,
     mount: Mount | None = None,
 ) -> ChestSimulation:
-    """Let a person of a height go through postures with one sensor on the chest.
+    """Simulate a person of a height going through postures with one sensor on the chest.
 
     Parameters
     ----------
-    mount : how the sensor sits, None = drawn.
+    mount : position and orientation of the sensor, None = random.
 
     Raises
     ------
@@ -188,7 +187,7 @@ def simulate_day(
 
 
 def _phases(day: Day, style: ChestStyle) -> tuple[Phase, ...]:
-    """Postures and the changes between them; from standing one simply walks off."""
+    """Postures and the transitions between them; walking starts directly from standing."""
     phases: list[Phase] = []
     now, before = 0.0, day[0].posture
     for hold in day:
@@ -203,12 +202,12 @@ def _phases(day: Day, style: ChestStyle) -> tuple[Phase, ...]:
 
 
 def _upright(posture: Posture) -> Posture:
-    """The posture that transitions lead to and from."""
+    """The upright posture at the other end of a transition."""
     return "stand" if posture in STEPPING or posture == "bow" else "lie" if posture == "lie_side" else posture
 
 
 def _roll(t: Floats, phases: tuple[Phase, ...]) -> Floats:
-    """Turn (n,) about the long axis of the trunk, rad, in which the person lies on a side and turns back."""
+    """Rotation (n,) about the long axis of the trunk, rad, for lying on a side and turning back."""
     roll = np.zeros(len(t))
     for phase in phases:
         if phase.kind == "lie_side":
@@ -218,7 +217,7 @@ def _roll(t: Floats, phases: tuple[Phase, ...]) -> Floats:
 
 
 def _sway(t: Floats, day: Day, phases: tuple[Phase, ...], sway_m: float) -> Floats:
-    """Way to the side (n,) of walking, once to each side in a stride."""
+    """Lateral displacement (n,) in walking, once to each side per stride."""
     aside = np.zeros(len(t))
     walks = iter([hold for hold in day if hold.posture in STEPPING])
     for phase in phases:
@@ -233,7 +232,7 @@ def _sway(t: Floats, day: Day, phases: tuple[Phase, ...], sway_m: float) -> Floa
 def _way(
     t: Floats, day: Day, phases: tuple[Phase, ...], style: ChestStyle
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Height and pitch (n,), way forward (n,) of the reference person, and times of the steps."""
+    """Height and pitch (n,), forward displacement (n,) of the reference person, and times of the steps."""
     start = POSTURES[_upright(day[0].posture)]
     height, pitch, forward = (
         np.full(len(t), start.height_m),
@@ -269,7 +268,7 @@ def _way(
 
 
 def _walk(t: Floats, phase: Phase, pace_hz: float, height: Floats, pitch: Floats, forward: Floats) -> Floats:
-    """Add one walk in place; returns when its steps have their highest points."""
+    """Add one walk in place; returns the times of the highest points of its steps."""
     into, left = t - phase.start_s, phase.end_s - t
     going = smoothstep(into / STARTING_S) * smoothstep(left / STARTING_S)
     wave = 2.0 * np.pi * pace_hz * into

@@ -1,9 +1,9 @@
-"""Hours to days of one sensor on the chest, block by block, and what really happened
-(docs/science/simulation.md, "Daily life").
+"""Hours to days of one sensor on the chest, block by block, with ground truth (docs/science/simulation.md,
+"Daily life").
 
-Changes of posture and walking are those of core/simulate/chest.py; while a posture is held the sensor
-measures gravity, the breath and now and then a shift in the seat. What was drawn for an item depends on the
-seed and the item's number alone, so that a day can be gone through as often as one likes.
+Transitions and walking are those of core/simulate/chest.py; during a held posture the sensor measures
+gravity, breathing and occasional shifts in the seat. Random values of an item depend only on the seed and the
+item's number, so that a day can be iterated any number of times.
 """
 
 from __future__ import annotations
@@ -87,12 +87,11 @@ class DailyItem:
 
 @dataclass(frozen=True, eq=False)
 class DailySimulation:
-    """A long recording and what really happened in it.
+    """A long recording with its ground truth.
 
     Parameters
     ----------
-    phases : what was done, changes of posture among them ("sit_to_stand" …). steps_s : highest points of
-        the steps.
+    phases : activities, including transitions ("sit_to_stand" …). steps_s : highest points of the steps.
     """
 
     stream: LongStream
@@ -104,7 +103,8 @@ class DailySimulation:
 
 
 def plan_daily_life(hours: float, seed: int) -> tuple[DailyItem, ...]:
-    """A day from midnight on: night, rising, hours of sitting, standing and walking, the sensor off once.
+    """A day from midnight on: night, getting up, hours of sitting, standing and walking, one period of
+    non-wear.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def plan_daily_life(hours: float, seed: int) -> tuple[DailyItem, ...]:
 
 
 def _spend_night(rng: np.random.Generator) -> list[DailyItem]:
-    """Back and sides in turn, then up."""
+    """Lying alternately on the back and the sides, then getting up."""
     items: list[DailyItem] = []
     asleep = float(rng.uniform(6.0, 7.5)) * 3600.0
     while asleep > 0.0:
@@ -147,7 +147,7 @@ def _spend_night(rng: np.random.Generator) -> list[DailyItem]:
 
 
 def _spend_time(kind: str, rng: np.random.Generator) -> list[DailyItem]:
-    """Some minutes of a day: one kind of those that `plan_daily_life` draws."""
+    """Some minutes of a day: one of the activities drawn by `plan_daily_life`."""
     if kind == "sit":
         return [
             DailyItem("stand", 4.0),
@@ -181,7 +181,7 @@ def _spend_time(kind: str, rng: np.random.Generator) -> list[DailyItem]:
 
 
 def _do_chores(rng: np.random.Generator) -> list[DailyItem]:
-    """Standing and short walks in turn, bowing now and then."""
+    """Alternate standing and short walks, with occasional bowing."""
     items: list[DailyItem] = []
     for _ in range(int(rng.integers(1, 6))):
         pace = float(rng.uniform(80.0, 115.0))
@@ -193,7 +193,7 @@ def _do_chores(rng: np.random.Generator) -> list[DailyItem]:
 
 
 def draw_style(seed: int) -> ChestStyle:
-    """A person: how they rise, lie down and sway."""
+    """Random style of a person: rising, lying down and sway."""
     rng = np.random.default_rng(np.random.SeedSequence((seed, 11)))
     return ChestStyle(
         lean_rad=float(rng.uniform(radians(25.0), radians(45.0))),
@@ -212,7 +212,7 @@ def simulate_daily_life(
     has_gyro: bool = False,
     style: ChestStyle | None = None,
 ) -> DailySimulation:
-    """Let a person live through a plan with one sensor on the chest."""
+    """Simulate a person going through a plan with one sensor on the chest."""
     style = style or draw_style(seed)
     rng = np.random.default_rng(np.random.SeedSequence((seed, 13)))
     scale = Walker.of_height(height_m).scale
@@ -238,7 +238,7 @@ def simulate_daily_life(
 
 
 def record_daily_life(made: DailySimulation) -> Recording:
-    """The whole recording at once, worn on the chest."""
+    """The whole recording in memory, assigned to the chest."""
     blocks = list(made.stream.open_blocks())
     t_s, acc = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("t_s", "acc"))
     gyr = [b.gyr for b in blocks if b.gyr is not None]
@@ -261,7 +261,7 @@ def record_daily_life(made: DailySimulation) -> Recording:
 
 @dataclass(frozen=True, eq=False)
 class _Outline:
-    """What an item is made of: its change of posture and itself, and so many samples."""
+    """Timing of an item: its transition and itself, and the number of samples."""
 
     phases: tuple[Phase, ...]
     steps_s: Floats
@@ -271,7 +271,7 @@ class _Outline:
 
 @dataclass(frozen=True, eq=False)
 class _Person:
-    """Somebody who lives through items."""
+    """A person going through items."""
 
     items: tuple[DailyItem, ...]
     height_m: float
@@ -300,7 +300,7 @@ class _Person:
         return _Outline(tuple(phases), steps, samples, moving)
 
     def blocks(self) -> Iterator[SampleBlock]:
-        """The recording from its first sample."""
+        """Blocks of the recording from its first sample."""
         first = 0
         for i in range(len(self.items)):
             made = self.outline(i)
@@ -315,7 +315,7 @@ class _Person:
                 first, left = first + count, left - count
 
     def _before(self, i: int) -> str:
-        """Posture that item i begins in."""
+        """Initial posture of item i."""
         before = next((x.posture for x in reversed(self.items[:i]) if x.posture != "bow"), None)
         return self.items[i].posture if before is None else before
 
@@ -341,7 +341,7 @@ class _Person:
         return signals.acc[part], signals.gyr[part]
 
     def _hold(self, posture: str, first: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
-        """Samples of a held posture: gravity, breath, and shifts of the trunk."""
+        """Samples of a held posture: gravity, breathing, and shifts of the trunk."""
         t = (first + np.arange(count)) / self.rate_hz
         if posture == OFF:
             flat = np.tile([0.0, 0.0, GRAVITY], (count, 1))
@@ -364,7 +364,7 @@ class _Person:
 
 
 def _base(posture: str) -> str:
-    """The posture that changes lead to and from."""
+    """The posture at the other end of transitions."""
     if posture in STEPPING or posture == "bow":
         return "stand"
     return "lie" if posture == "lie_side" else posture

@@ -1,8 +1,9 @@
-"""Movements done for a calibration, with their truth: swings of each leg from the hip, and bows of the trunk
+"""Functional calibration movements with ground truth: swings of each leg from the hip, and bows of the trunk
 (docs/science/simulation.md, "Swings and bows").
 
-The person stands; the standing leg and the arms are still but for a sway. No person moves about one axis
-alone: the swinging leg also goes a little aside and turns, and the trunk a little to the side.
+The person is in standing; the supporting leg and the arms are still except for sway. Real movements are not
+about a single axis: the swinging leg also abducts and rotates a little, and the trunk leans a little to the
+side.
 """
 
 from __future__ import annotations
@@ -33,16 +34,16 @@ RAMP_S: Final = 0.6
 
 @dataclass(frozen=True)
 class SwingsAndBows:
-    """What is done: standing, swings of each leg, bows, with standing between.
+    """Sequence of movements: standing, swings of each leg, bows, with standing in between.
 
     Parameters
     ----------
-    swings, bows : of each leg, of the trunk; 0 leaves them out. sides : which leg first.
-    forward_rad, backward_rad : of the thigh from standing. aside_rad, turned_rad : of it to the side and
-        about its long axis. aside_per_swing : how often it goes aside in a swing or bow; 1 bends the main
-        axis itself.
-    knee_rad : flexion while the leg swings. bow_rad : of the pelvis. sway_rad : of it sideways.
-    swing_s, bow_s : one of them. lead_s, rest_s : standing before all, and after each run.
+    swings, bows : number for each leg, for the trunk; 0 omits them. sides : order of the legs.
+    forward_rad, backward_rad : of the thigh from standing. aside_rad, turned_rad : abduction and rotation
+        about its long axis. aside_per_swing : lateral movements per swing or bow; 1 tilts the main axis
+        itself.
+    knee_rad : flexion during leg swing. bow_rad : of the pelvis. sway_rad : lateral, of the pelvis.
+    swing_s, bow_s : duration of one. lead_s, rest_s : standing at the beginning, and after each series.
     """
 
     swings: int = 12
@@ -73,12 +74,13 @@ class SwingsAndBows:
 
 @dataclass(frozen=True, eq=False)
 class FunctionalTruth:
-    """Exact truth at the samples of the recording.
+    """Exact ground truth at the samples of the recording.
 
     Parameters
     ----------
     t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m. angles : name → (n,) rad as in core/angles.
-    phases : "stand", "swing_left", "swing_right", "bow" in turn. mounts : how the sensors sit.
+    phases : "stand", "swing_left", "swing_right", "bow" in order. mounts : position and alignment of the
+        sensors.
     """
 
     t_s: Floats
@@ -92,7 +94,7 @@ class FunctionalTruth:
 
 @dataclass(frozen=True, eq=False)
 class FunctionalSimulation(Recorded):
-    """A recording of swings and bows and what really happened."""
+    """A recording of swings and bows with its ground truth."""
 
     truth: FunctionalTruth
 
@@ -103,7 +105,7 @@ def simulate_swings_and_bows(
     seed: int = 0,
     setup: RecordingSetup | None = None,
 ) -> FunctionalSimulation:
-    """Let a person of a height swing the legs and bow, with seven sensors.
+    """Simulate a person of a height swinging the legs and bowing, with seven sensors.
 
     Raises
     ------
@@ -141,7 +143,9 @@ def _plan(does: SwingsAndBows) -> tuple[Phase, ...]:
 def _pose(
     t: Floats, phases: tuple[Phase, ...], does: SwingsAndBows, anatomy: Anatomy, rng: np.random.Generator
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
-    """Orientations (n, 4) and origins (n, 3) in m of seven segments; the pelvis is over the standing feet."""
+    """Orientations (n, 4) and origins (n, 3) in m of seven segments; the pelvis is above the supporting
+    feet.
+    """
     zero = np.zeros(len(t))
     hip = {side: (zero.copy(), zero.copy(), zero.copy(), zero.copy()) for side in SIDES}
     bow, sway = zero.copy(), zero.copy()

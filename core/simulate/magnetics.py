@@ -1,7 +1,8 @@
-"""The magnetic field in a room: the Earth's, and that of iron things, which fades with the cube of distance.
+"""The magnetic field in a room: that of the Earth and of ferromagnetic objects, which decays with the cube of
+distance.
 
-Steel furniture, reinforced floors and lifts bend the field where they are; iron at the sensor itself turns
-with it (hard iron, core/simulate/mems.py). Fields are in units of the Earth's field, as Xsens reports them.
+Steel furniture, reinforced floors and lifts distort the field locally; iron at the sensor itself rotates with
+it (hard iron, core/simulate/mems.py). Fields are in units of the Earth's field, as in Xsens data.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ IRON_SIZE_M: Final = 0.1
 
 @dataclass(frozen=True)
 class Dipole:
-    """A magnetised thing.
+    """A magnetised object.
 
     Parameters
     ----------
     position_m : (x, y, z) in the world, the floor at z = 0.
-    moment : (x, y, z) so that the field at 1 m on the axis is twice the moment, in Earth's fields · m³.
+    moment : (x, y, z) the field at 1 m on the axis is twice the moment, in Earth's fields · m³.
     """
 
     position_m: tuple[float, float, float]
@@ -48,7 +49,7 @@ def earth_field(north_rad: float) -> Floats:
 
 
 def field_at(p: Floats, north_rad: float, dipoles: tuple[Dipole, ...]) -> Floats:
-    """The field in the world at places p (n, 3) in m: (3 (m·r) r / r² − m) / r³ per dipole; (n, 3)."""
+    """The field in the world at positions p (n, 3) in m: (3 (m·r) r / r² − m) / r³ per dipole; (n, 3)."""
     field = np.tile(earth_field(north_rad), (len(p), 1))
     for dipole in dipoles:
         moment = np.array(dipole.moment)

@@ -1,4 +1,4 @@
-"""What a MEMS device makes of a signal: noise, biases that wander, scale errors, hard iron and its range."""
+"""Errors of a MEMS device: noise, bias instability, scale errors, hard iron and range limits."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class SensorNoise:
     ----------
     gyr_bias, acc_bias, gyr_scale, acc_scale, hard_iron : standard deviations of constants drawn once per
         axis.
-    mag_density, hard_iron : of a field with strength 1 (iron: our choice; sensors leave the maker with little
-        of it, what they are fixed to may bring more).
+    mag_density, hard_iron : of a field with strength 1 (iron: our choice; sensors are calibrated at the
+        factory, but mounting hardware may add more).
     """
 
     gyr_density: float = radians(0.01)
@@ -40,7 +40,7 @@ class SensorNoise:
     hard_iron: float = 0.02
 
     def times(self, k: float) -> SensorNoise:
-        """All errors k times as large."""
+        """All errors multiplied by k."""
         return SensorNoise(**{f.name: k * getattr(self, f.name) for f in fields(self)})
 
 
@@ -50,7 +50,7 @@ MEMS: Final = SensorNoise()
 
 @dataclass(frozen=True, eq=False)
 class DrawnErrors:
-    """Constant errors a sensor was given, all (3,): true = (measured − bias) / scale; hard iron is added."""
+    """Constant errors of a sensor, all (3,): true = (measured − bias) / scale; hard iron is added."""
 
     gyr_bias: Floats
     gyr_scale: Floats
@@ -66,11 +66,12 @@ def add_sensor_errors(
     rng: np.random.Generator,
     of_iron: np.random.Generator,
 ) -> tuple[SimulatedSignals, DrawnErrors]:
-    """Add scale errors, constant and wandering biases, white noise and hard iron.
+    """Add scale errors, constant and varying biases, white noise and hard iron.
 
     Parameters
     ----------
-    of_iron : a stream of its own, so that magnets leave accelerometer and gyroscope as they are.
+    of_iron : a separate random stream, so that hard iron does not change the errors of accelerometer and
+        gyroscope.
     """
     shape = ideal.acc.shape
     drawn = DrawnErrors(
@@ -94,7 +95,9 @@ def add_sensor_errors(
 def clip_signals(
     signals: SimulatedSignals, acc_range: float, gyr_range: float
 ) -> tuple[SimulatedSignals, Bools]:
-    """The signals held within the ranges (m/s², rad/s per axis), and where (n,) any axis was beyond."""
+    """The signals clipped to the ranges (m/s², rad/s per axis), and a mask (n,) of samples with any
+    clipped axis.
+    """
     too_much = (np.abs(signals.acc) > acc_range) | (np.abs(signals.gyr) > gyr_range)
     beyond: Bools = np.any(too_much, axis=1)
     if not beyond.any():

@@ -1,4 +1,4 @@
-"""The named movements of the command line that are not walks: squats, chair and bed, swings and bows."""
+"""The named movements of the command line other than walks: squats, chair and bed, swings and bows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from sagittal.core.simulate.tug import ChairSimulation, simulate_chair_rises, si
 
 @dataclass(frozen=True)
 class ChairTest:
-    """A test that begins on a chair: there and back, or five rises; who does it."""
+    """A test that begins on a chair: timed up and go, or five rises; and the person."""
 
     person: str
     rises: bool = False
@@ -26,11 +26,12 @@ class ChairTest:
 
 @dataclass(frozen=True)
 class Movement:
-    """What is done: squats, swings and bows, postures of a chest, or a test that begins on a chair.
+    """A kind of movement: squats, swings and bows, postures of a chest, or a test that begins on a chair.
 
     Parameters
     ----------
-    agreed : sensors sit as the fixed offset has them (docs/science/squat.md, "Fixed offset"), else anyhow.
+    agreed : sensors attached as specified for the fixed offset (docs/science/squat.md, "Fixed offset"), else
+        in random orientation.
     """
 
     title: str

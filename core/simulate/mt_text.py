@@ -1,4 +1,4 @@
-"""Streams as Xsens MT Manager 4.x writes them: one text file per sensor (docs/reference/formats.md)."""
+"""Streams in the format of Xsens MT Manager 4.x: one text file per sensor (docs/reference/formats.md)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ COUNTER_RANGE = 1 << 16
 
 
 def mt_text(stream: ImuStream, first_counter: int = 0) -> str:
-    """Render one stream; samples that were lost have no row, as in real files.
+    """Render one stream; lost samples have no row, as in real files.
 
     Parameters
     ----------

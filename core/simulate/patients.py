@@ -1,9 +1,9 @@
-"""Twelve virtual people: how each walks differently from the healthy reference
-(docs/science/simulation.md, "Virtual people").
+"""Twelve simulated patients: deviations of each gait from the healthy reference (docs/science/simulation.md,
+"Virtual people").
 
-One body, plausible in scale, no clinical data: they show that the analysis finds and names a deviation, never
-how well it does on patients. Where one side is affected it is the left. Parameters are commands; what comes
-out is written down and tested as signatures.
+One body, plausible amplitudes, no clinical data: they show that the analysis detects and names a deviation,
+never how well it performs on patients. If one side is affected it is the left. Parameters are inputs; the
+resulting gait is documented and tested as signatures.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from sagittal.core.simulate.walker import SideGait, Variability, Walker
 
 @dataclass(frozen=True)
 class SimulatedPatient:
-    """A person and the steps this person takes: length in m at the reference height, duration in s."""
+    """A person with the steps taken: length in m at the reference height, duration in s."""
 
     title: str
     step_m: float

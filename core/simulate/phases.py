@@ -1,4 +1,4 @@
-"""Named stretches of a take: what a person was doing, from when to when."""
+"""Named stretches of a recording: activity with start and end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Phase:
-    """Something done from `start_s` to `end_s`."""
+    """An activity from `start_s` to `end_s`."""
 
     kind: str
     start_s: float
@@ -16,7 +16,7 @@ class Phase:
 
 
 def phase_table(phases: Sequence[Phase]) -> dict[str, list[float] | list[str]]:
-    """`start_s`, `end_s` and `kind` as columns, in order of time."""
+    """`start_s`, `end_s` and `kind` as columns, in chronological order."""
     return {
         "start_s": [p.start_s for p in phases],
         "end_s": [p.end_s for p in phases],

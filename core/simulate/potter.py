@@ -1,8 +1,8 @@
 """The three-body walker of Potter et al. 2021 (data set 1): a pelvis and two straight legs with hinged hips.
 
-It exists to reproduce that paper's Tables 2 and 3; people do not walk like this
-(docs/science/simulation.md, "Potter's walker"). Sensors sit 8 cm above the middle of the hips and at the ends
-of the legs, turned as their segments.
+It serves to reproduce Tables 2 and 3 of that paper; people do not walk like this (docs/science/simulation.md,
+"Potter's walker"). Sensors are 8 cm above the midpoint of the hips and at the ends of the legs, aligned with
+their segments.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ docs/science/erkf.md, "Departures from the paper")."""
 
 @dataclass(frozen=True)
 class HipJoint:
-    """One hip: sensors `proximal` and `distal` by index, its centre in both sensors' axes, m (3,)."""
+    """One hip: sensors `proximal` and `distal` by index, its centre in the axes of both sensors, m (3,)."""
 
     proximal: int
     distal: int
@@ -60,16 +60,16 @@ class HipJoint:
 
 @dataclass(frozen=True, eq=False)
 class PotterWalk:
-    """Exact truth and ideal signals of three sensors; the sensor axis of the arrays is that of `IMUS`.
+    """Exact ground truth and ideal signals of three sensors; the sensor axis of the arrays is that of `IMUS`.
 
     Parameters
     ----------
     t_s : (n,). acc, gyr : (n, 3, 3) m/s², rad/s. p, v : (n, 3, 3) m, m/s in the world. q : (n, 3, 4).
     hips : side → joint. hinge_axis : (3,) axis of both hips, the same in the axes of all three sensors.
-    still : (n,) nothing moves: both feet and the pelvis are at rest.
+    still : (n,) both feet and the pelvis are at rest.
     hip_flexion : side → (n,) rad. Hip adduction and rotation are exactly zero.
-    footfalls : side → sample at which the foot comes to rest, one per step of that foot.
-    footfall_still : samples from a footfall to the middle of the still period that follows.
+    footfalls : side → sample at which the foot comes to rest, one per step of that foot. footfall_still :
+        samples from a footfall to the middle of the following still period.
     """
 
     t_s: Floats
@@ -89,7 +89,9 @@ class PotterWalk:
     def add_noise(
         self, acc_sd: float = ACC_SD, gyr_sd: float = GYR_SD, seed: int = 0
     ) -> tuple[Floats, Floats]:
-        """Signals (n, 3, 3) with white noise of so much per sample, the paper's only error."""
+        """Signals (n, 3, 3) with white noise of this standard deviation per sample, the only error in the
+        paper.
+        """
         rng = np.random.default_rng(seed)
         return (
             self.acc + rng.normal(0.0, acc_sd, self.acc.shape),
@@ -99,8 +101,8 @@ class PotterWalk:
     def strides(self, p: Floats | None = None) -> tuple[Floats, Floats]:
         """Stride lengths and widths (strides,) in m of a track p (n, 3, 3), of the truth if none is given.
 
-        Both are taken in the middle of the still periods; width is the other foot's distance from the line
-        between two footprints of one foot, so neither changes when the whole track is turned.
+        Both are evaluated in the middle of the still periods; width is the other foot's distance from the
+        line between two footprints of one foot, so neither changes under rotation of the whole track.
         """
         track = self.p if p is None else p
         lengths, widths = [], []
@@ -123,7 +125,7 @@ class PotterWalk:
 def potter_walk(strides: int = 200, rate_hz: float = 512.0) -> PotterWalk:
     """Walk straight along +x, right foot in front at the start; 200 strides take 446 s.
 
-    The swinging foot scuffs a little below the floor, as in the paper.
+    The swinging foot passes slightly below the floor, as in the paper.
     """
     step_s = 0.5 * STRIDE_S
     n = round((LEAD_S + strides * STRIDE_S + 1.0) * rate_hz)

@@ -1,4 +1,4 @@
-"""From the paths of sensors to a recording: errors, ranges, lagging clocks, lost packets."""
+"""From the paths of sensors to a recording: errors, ranges, clock lags, lost packets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,9 @@ BURST: Final = 3.0
 
 
 class Draws:
-    """Random numbers of one seed, a stream for each kind: another noise level leaves the steps alone."""
+    """Random numbers of one seed, a separate stream for each purpose: another noise level does not change
+    the steps.
+    """
 
     def __init__(self, seed: int) -> None:
         streams = np.random.SeedSequence(seed).spawn(6)
@@ -35,13 +37,13 @@ class Draws:
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """What the sensors made of a motion.
+    """Recorded sensor signals of a motion.
 
     Parameters
     ----------
     ideal : segment → signals at every sample of the common axis, without errors, lags or losses.
-    sensor_q : segment → (n, 4) sensor to world at the same samples, moved by skin and shocks as it was.
-    errors : segment → constant errors it was given. clipped : segment → (n,) samples beyond its range.
+    sensor_q : segment → (n, 4) sensor to world at the same samples, including soft tissue and impacts.
+        errors : segment → constant errors. clipped : segment → (n,) samples outside its range.
     first_counter : packet counter at t = 0, for rendering device files.
     """
 
@@ -54,7 +56,7 @@ class Recorded:
 
 
 def oversampling(rate_hz: float) -> int:
-    """Steps of the fine grid per sample."""
+    """Ratio of the fine grid to the sample rate."""
     return max(4, ceil(FINE_RATE_HZ / rate_hz))
 
 
@@ -65,11 +67,11 @@ def record(
     height_m: float | None = None,
     protocol: Protocol = "walk",
 ) -> Recorded:
-    """Record sensors on their ways.
+    """Record sensors moving along paths.
 
     Parameters
     ----------
-    paths : segment → path on the common grid, `oversampling` times as fine as the recording.
+    paths : segment → path on the common grid, finer than the recording by the factor `oversampling`.
     """
     every = oversampling(setup.rate_hz)
     north = float(draws.mounts.uniform(-pi, pi))
@@ -106,7 +108,7 @@ def record(
 
 
 def _arrived(t: Floats, segment: Segment, setup: RecordingSetup, rng: np.random.Generator) -> Bools:
-    """Samples (n,) that reach the receiver: not lost in short runs, not inside a dropout."""
+    """Samples (n,) received: not lost in short runs, not inside a dropout."""
     arrived = np.ones(len(t), bool)
     if setup.packet_loss:
         # two states: a run starts so often that the wanted share is lost on average

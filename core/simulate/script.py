@@ -1,8 +1,8 @@
-"""What the person does: script items, and the footprints they lead to.
+"""Script of a simulated walk: its items, and the resulting footprints.
 
-Each walking item is cut into steps; before standing a short closing step brings the feet together. A step
-carries its own drawn deviations, so the footprints are the exact truth
-(docs/science/simulation.md, "Footprints").
+Each walking item is divided into steps; before standing a short closing step brings the feet together. Each
+step has its own random deviations, so the footprints are the exact truth (docs/science/simulation.md,
+"Footprints").
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Move:
 
 @dataclass(frozen=True)
 class Stand:
-    """Stand still."""
+    """Quiet standing."""
 
     duration_s: float
 
@@ -72,7 +72,7 @@ class Arc:
     step_s: float
 
     def moves(self) -> list[Move]:
-        """Steps of this item, all alike."""
+        """Steps of this item, all equal."""
         length = self.radius_m * abs(self.angle_rad)
         n = max(1, round(length / self.step_m))
         return [Move(length / n, self.angle_rad / n, self.step_s)] * n
@@ -80,14 +80,14 @@ class Arc:
 
 @dataclass(frozen=True)
 class Pivot:
-    """Turn on the spot by `angle_rad` (left positive) with about `per_step_rad` a step."""
+    """Turn on the spot by `angle_rad` (left positive) with about `per_step_rad` per step."""
 
     angle_rad: float
     per_step_rad: float
     step_s: float
 
     def moves(self) -> list[Move]:
-        """Steps of this item, all alike."""
+        """Steps of this item, all equal."""
         n = max(1, round(abs(self.angle_rad) / self.per_step_rad))
         return [Move(0.0, self.angle_rad / n, self.step_s)] * n
 
@@ -108,7 +108,7 @@ Script = tuple[Item, ...]
 
 
 def scale_script(script: Script, k: float) -> Script:
-    """The same script with all lengths k times as long, for a person k times as tall."""
+    """The same script with all lengths multiplied by k, for a person taller by the factor k."""
     return tuple(
         SingleSteps(tuple((k * length, turn, duration) for length, turn, duration in item.steps))
         if isinstance(item, SingleSteps)
@@ -119,16 +119,16 @@ def scale_script(script: Script, k: float) -> Script:
 
 @dataclass(frozen=True)
 class Footprint:
-    """Where and when a foot lands.
+    """Position and time of a landing foot.
 
     Parameters
     ----------
-    time_s : initial contact; −inf for the two footprints the take starts on.
-    x_m, y_m : floor point under the ankle centre while the foot is flat.
+    time_s : initial contact; −inf for the two initial footprints.
+    x_m, y_m : floor point below the ankle centre with the foot flat.
     path_rad : heading of the body's path. foot_rad : heading of the foot (with toe-out). Both unwrapped.
-    step_m, step_s : length and duration of the step that led here, as drawn.
-    opens, closes : first step after standing, last before standing.
-    pitch_rad, knee_rad, hip_rad : drawn deviations of this step's angles.
+    step_m, step_s : length and duration of the step that ends here, including random deviations. opens,
+        closes : first step after standing, last before standing. pitch_rad, knee_rad, hip_rad : random
+        deviations of this step's angles.
     """
 
     side: Side
@@ -153,13 +153,12 @@ class Footprint:
 
 @dataclass(frozen=True)
 class Plan:
-    """A script worked out.
+    """The footprints of a script.
 
     Parameters
     ----------
-    steps : every step in order of time.
-    footprints : side → the footprint it starts on, then its steps.
-    stands : (start, end) of each standing in s. tremors : when the legs tremble.
+    steps : all steps in chronological order. footprints : side → its initial footprint, then its steps.
+        stands : (start, end) of each standing period in s. tremors : trembling of the legs.
     """
 
     steps: tuple[Footprint, ...]
@@ -170,17 +169,17 @@ class Plan:
 
     @property
     def typical_step_s(self) -> float:
-        """Median step time; smoothing windows are fractions of it."""
+        """Median step time; the unit of smoothing windows."""
         return float(np.median([s.step_s for s in self.steps])) if self.steps else 0.5
 
 
 def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
-    """Work a script out into footprints, starting at the origin with heading +x, right foot first.
+    """Convert a script to footprints, starting at the origin with heading +x, right foot first.
 
     Raises
     ------
-    ParameterError : "script_standing" when it does not start and end with standing, "script_item" when a
-        length, a radius or a time is not positive.
+    ParameterError : "script_standing" if it does not start and end with standing, "script_item" if a length,
+        a radius or a time is not positive.
     """
     _check(script)
     walk = _Walk(walker, rng)
@@ -210,7 +209,7 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
 
 @dataclass
 class _Walk:
-    """Somebody on the way: where, when, which foot is next, and what was done so far."""
+    """State of a walk: position, time, next foot, and footprints so far."""
 
     walker: Walker
     rng: np.random.Generator
@@ -224,19 +223,19 @@ class _Walk:
     stands: list[tuple[float, float]] = field(default_factory=list)
 
     def land(self, of: Side, wider_m: float) -> tuple[float, float, float]:
-        """Where a foot comes down beside the path, and where it points."""
+        """Lateral position of a footprint relative to the path, and its direction."""
         lateral = -SIGN[of] * (self.walker.width_m / 2.0 + wider_m)
         foot = self.heading - SIGN[of] * self.walker.sides[of].toe_out_rad
         return self.x - lateral * sin(self.heading), self.y + lateral * cos(self.heading), foot
 
     def stand(self, duration_s: float) -> None:
-        """Stand still; the next step opens a walk."""
+        """Quiet standing; the next step opens a walk."""
         self.stands.append((self.t, self.t + duration_s))
         self.t += duration_s
         self.opens = True
 
     def step(self, move: Move, *, closes: bool) -> None:
-        """One step of the foot that is next."""
+        """One step of the next foot."""
         spread = self.walker.variability
         g = np.clip(self.rng.standard_normal(6), -CLIP, CLIP)
         gait = self.walker.sides[self.side]

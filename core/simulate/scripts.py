@@ -1,4 +1,4 @@
-"""The named scripts of CLI, demo and accuracy tests."""
+"""The named scripts for CLI, demo and accuracy tests."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ REFERENCE_PERSON: Final = Walker()
 
 @dataclass(frozen=True)
 class Scenario:
-    """A script, written for a walker of the reference height, who walks it, and how it is recorded."""
+    """A script for a walker of the reference height, the walker, and the recording set-up."""
 
     title: str
     script: Script
@@ -59,14 +59,15 @@ _LAP: Script = (
 
 
 def _bouts(patient: SimulatedPatient, bout_m: float = 12.0) -> Scenario:
-    """Two straight bouts with a stop, the take the signatures of virtual people were measured on."""
+    """Two straight bouts with a stop: the recording used to measure the signatures of simulated patients."""
     bout = Straight(bout_m, patient.step_m, patient.step_s)
     return Scenario(patient.title, (Stand(6.0), bout, Stand(2.0), bout, Stand(4.0)), walker=patient.walker)
 
 
 def _festination(start: SimulatedPatient, steps: int = 14) -> Scenario:
-    """Steps that grow shorter and quicker, a freeze of 4 s, and the same again
-    (docs/science/simulation.md, "Virtual people")."""
+    """Steps that become shorter and faster, a freeze of 4 s, and the same again
+    (docs/science/simulation.md, "Virtual people").
+    """
     hurry = SingleSteps(
         tuple((start.step_m * (1 - 0.035 * i), 0.0, start.step_s * (1 - 0.02 * i)) for i in range(steps))
     )
@@ -141,11 +142,11 @@ def simulate_scenario(
     worn: tuple[Segment, ...] | None = None,
     dropouts: tuple[Dropout, ...] | None = None,
 ) -> Simulation:
-    """Simulate a named script for a person of a height; its lengths grow with the person.
+    """Simulate a named script for a person of a height; its lengths scale with the person.
 
     Parameters
     ----------
-    worn, dropouts : other sensors than all seven, other failures than the script's own.
+    worn, dropouts : sensors, if not all seven; failures, if not those of the script.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The IMUs: how they sit on the segments, and what errorless ones would measure.
+"""Simulated IMUs: their position and alignment on the segments, and their ideal signals.
 
 Units and gravity sign as in core/frames.py: at rest the accelerometer reads +g along the up axis.
 """
@@ -54,14 +54,14 @@ class Mount:
 
 @dataclass(frozen=True, eq=False)
 class SensorPath:
-    """Where a sensor is and how it is turned at times t_s (n,): p (n, 3) m, q (n, 4) sensor to world."""
+    """Position and orientation of a sensor at times t_s (n,): p (n, 3) m, q (n, 4) sensor to world."""
 
     t_s: Floats
     p: Floats
     q: Floats
 
     def delay(self, by_s: float) -> SensorPath:
-        """The same way, done `by_s` later; standing still before its start and after its end."""
+        """The same path delayed by `by_s`; stationary before its start and after its end."""
         if by_s == 0.0:
             return self
         at = np.clip(self.t_s - by_s, self.t_s[0], self.t_s[-1])
@@ -71,7 +71,7 @@ class SensorPath:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSignals:
-    """What one sensor measures; (n, 3) each, sensor axes, at the recording's rate.
+    """Signals of one sensor; (n, 3) each, sensor axes, at the recording's rate.
 
     acc m/s², gyr rad/s, mag in units of the Earth's field.
     """
@@ -87,7 +87,7 @@ def draw_mounts(
     spread_rad: float,
     rng: np.random.Generator,
 ) -> dict[Segment, Mount]:
-    """Put sensors at `places` · scale, each turned about a random axis by up to `spread_rad`."""
+    """Place sensors at `places` · scale, each rotated about a random axis by up to `spread_rad`."""
     mounts: dict[Segment, Mount] = {}
     for segment, place in places.items():
         position = scale * (np.array(place) + rng.uniform(-PLACE_SPREAD_M, PLACE_SPREAD_M, 3))
@@ -105,11 +105,12 @@ def place_sensor(
     impacts: tuple[Impact, ...] = (),
     tremors: tuple[Tremor, ...] = (),
 ) -> SensorPath:
-    """The way of a sensor on a moving body.
+    """Path of a sensor on a moving body.
 
     Parameters
     ----------
-    tissue : between sensor and bone, None = stiff. impacts : contacts that shake it. tremors : of the leg.
+    tissue : between sensor and bone, None = rigid. impacts : contacts that make it vibrate.
+    tremors : of the leg.
     """
     place, turn, bone = mount.position_m, mount.q_segment_sensor, body.q[segment]
     skin = None if tissue is None else skin_motion(body.q, segment, tissue)
@@ -127,11 +128,12 @@ def place_sensor(
 def ideal_signals(
     path: SensorPath, every: int, sampling: Sampling, north_rad: float = 0.0, dipoles: tuple[Dipole, ...] = ()
 ) -> SimulatedSignals:
-    """Signals of an errorless sensor at every `every`-th sample of its path.
+    """Ideal signals of a sensor at every `every`-th sample of its path.
 
     Parameters
     ----------
-    north_rad : heading of magnetic north in the world. dipoles : iron that disturbs the field.
+    north_rad : heading of magnetic north in the world. dipoles : ferromagnetic objects that distort the
+        field.
     """
     velocity, acceleration, rate = differentiate_pose(path.t_s, path.p, path.q)
     up = np.array([0.0, 0.0, GRAVITY])

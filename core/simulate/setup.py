@@ -1,4 +1,4 @@
-"""How a simulated take is recorded: rate, sensors, their errors, and what goes wrong on the way."""
+"""Recording set-up of a simulation: rate, sensors, their errors and failures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagittal.core.simulate.sensors import Sampling
 
 @dataclass(frozen=True)
 class Dropout:
-    """One sensor lost from `start_s` to `end_s`."""
+    """Data loss of one sensor from `start_s` to `end_s`."""
 
     segment: Segment
     start_s: float
@@ -24,7 +24,7 @@ class Dropout:
 
 @dataclass(frozen=True)
 class Lag:
-    """A sensor whose clock lags: samples show what happened `late_s` (−1 to 1) earlier than they say."""
+    """A sensor with a clock offset: samples show events `late_s` (−1 to 1) earlier than their time stamps."""
 
     segment: Segment
     late_s: float
@@ -39,17 +39,16 @@ class Lag:
 
 @dataclass(frozen=True)
 class RecordingSetup:
-    """How it is recorded.
+    """Recording set-up.
 
     Parameters
     ----------
-    rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : sensors are turned by up to this.
-    noise : None for ideal sensors. tissue : None for sensors fixed to the bone.
-    impacts : contacts of the feet shake the sensors.
-    acc_range, gyr_range : full scale per axis, m/s² and rad/s; real sensors cut off what is beyond.
-    dipoles : iron in the room. packet_loss : share of lost samples, in short runs, 0 to 0.5.
-    dropouts, lags : of single sensors.
-    worn : the sensors that are recorded.
+    rate_hz : 20 to 1000. sampling : see `Sampling`. mount_spread_rad : maximum random rotation of sensors.
+        noise : None for ideal sensors. tissue : None for sensors fixed to the bone. impacts : contacts of the
+        feet make the sensors vibrate.
+    acc_range, gyr_range : full scale per axis, m/s² and rad/s; larger values are clipped, as in real sensors.
+        dipoles : ferromagnetic objects in the room. packet_loss : fraction of lost samples, in short runs, 0
+        to 0.5. dropouts, lags : of single sensors. worn : the recorded sensors.
     """
 
     rate_hz: float = 100.0

@@ -1,4 +1,4 @@
-"""From a script to a recording with its truth: the door of the walking simulator."""
+"""From a script to a recording with ground truth: the entry point of the walking simulator."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagittal.core.simulate.walker import Walker
 
 @dataclass(frozen=True, eq=False)
 class Simulation(Recorded):
-    """A recorded walk and what really happened."""
+    """A simulated recording of a walk with its ground truth."""
 
     truth: WalkTruth
 
@@ -37,12 +37,12 @@ class Simulation(Recorded):
 def simulate(
     script: Script, walker: Walker | None = None, seed: int = 0, setup: RecordingSetup | None = None
 ) -> Simulation:
-    """Let a walker do a script with seven sensors on; the same arguments give the same bits.
+    """Simulate a walker following a script with seven sensors; equal arguments give bit-identical results.
 
     Parameters
     ----------
     script : starts and ends with standing. walker : default is the healthy reference person.
-    seed : of everything drawn, see `Draws`.
+    seed : of all random numbers, see `Draws`.
 
     Raises
     ------

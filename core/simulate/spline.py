@@ -1,6 +1,6 @@
 """Velocities and accelerations of sampled poses: exact derivatives of quintic interpolating splines.
 
-Truth and signals come from one curve, so integrating the signals gives the truth back
+Ground truth and signals come from one curve, so integrating the signals reproduces the truth
 (docs/science/simulation.md, "Signals").
 """
 
@@ -22,8 +22,8 @@ def differentiate_pose(t: Floats, p: Floats, q: Floats) -> tuple[Floats, Floats,
 
     Returns
     -------
-    velocity (n, 3) m/s and acceleration (n, 3) m/s² in the world, angular rate (n, 3) rad/s in the body:
-    ω = vec(2 q* ⊗ q̇); what the spline does to the norm of q only reaches the scalar part.
+    Velocity (n, 3) m/s and acceleration (n, 3) m/s² in the world, angular rate (n, 3) rad/s in the body: ω =
+    vec(2 q* ⊗ q̇); deviations of the norm of q caused by the spline affect only the scalar part.
     """
     spline = make_interp_spline(t, np.column_stack((p, q)), k=5)
     first = spline.derivative(1)(t)

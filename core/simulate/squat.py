@@ -1,9 +1,9 @@
-"""Squats: a still foot and a chain of three links on it, in closed form
-(docs/science/simulation.md, "Squat").
+"""Squats: a still foot and a chain of three links on it, in closed form (docs/science/simulation.md,
+"Squat").
 
-For estimators that build on a fixed foot (Kianifar et al.: sensors on shank, thigh and lower back) and as a
-motion that breaks those made for walking. The other leg is left out, or lifted until its turn, or squats
-along.
+For estimators that assume a fixed foot (Kianifar et al.: sensors on shank, thigh and lower back) and as a
+motion that violates the assumptions of those made for walking. The other leg is omitted, or lifted until its
+turn, or squats as well.
 """
 
 from __future__ import annotations
@@ -50,18 +50,18 @@ WOBBLE_RAD, WOBBLE_HZ = radians(3.0), 0.6
 
 @dataclass(frozen=True)
 class Squats:
-    """What is done; angles at the depth asked for, in standing otherwise.
+    """Parameters of the movement; angles at full depth, in standing otherwise.
 
     Parameters
     ----------
-    depth_rad : knee flexion added to standing, varying by `spread` (relative SD, limited to two).
-    moving_s : down and up together. hold_s : at the bottom. rest_s : standing after each. lead_s : before.
-    valgus_rad : knee falling inward. trunk_rad : forward lean of the pelvis.
-    hinged : the knee is a hinge: it falls inward because the shank turns and leans inward, and the hip
-        follows; else it opens sideways itself.
-    other : the leg of the other side has no sensors and is left out; or its foot is lifted while this leg
-        squats, then it squats as often while this one is lifted; or both squat together on both feet, which
-        needs `valgus_rad` 0: a level pelvis closes the chain.
+    depth_rad : knee flexion added to standing, varying by `spread` (relative SD, limited to two). moving_s :
+        descent and ascent together. hold_s : at the lowest point. rest_s : standing after each. lead_s :
+        before.
+    valgus_rad : dynamic knee valgus. trunk_rad : forward lean of the pelvis. hinged : the knee is a hinge:
+        valgus arises because the shank rotates and leans inward, and the hip follows; else the knee itself
+        abducts. other : the leg of the other side has no sensors and is omitted; or its foot is lifted while
+        this leg squats, and they then change roles; or both squat together on both feet, which requires
+        `valgus_rad` 0: a level pelvis closes the chain.
     """
 
     side: Side = "right"
@@ -96,29 +96,29 @@ class Squats:
 
     @property
     def cycle_s(self) -> float:
-        """One squat and the rest after it."""
+        """Duration of one squat and the following rest."""
         return self.moving_s + self.hold_s + self.rest_s
 
     @property
     def sides(self) -> tuple[Side, ...]:
-        """The legs that squat, in the order in which they begin."""
+        """The squatting legs, in the order in which they begin."""
         other: Side = "left" if self.side == "right" else "right"
         return (self.side,) if self.other == "left_out" else (self.side, other)
 
     @property
     def turns(self) -> int:
-        """How often `repetitions` squats are done."""
+        """Number of series of `repetitions` squats."""
         return 2 if self.other == "lifted" else 1
 
     @property
     def turn_s(self) -> float:
-        """From one turn to the next: the squats, and lifting the other foot before and after them."""
+        """Duration of a series: the squats, and lifting the other foot before and after them."""
         lifts = 2.0 * (LIFT_S + self.rest_s) if self.other == "lifted" else 0.0
         return self.repetitions * self.cycle_s + lifts
 
     @property
     def starts_s(self) -> Floats:
-        """(turns, repetitions) s."""
+        """Start times (turns, repetitions), s."""
         first = self.lead_s + (LIFT_S + self.rest_s if self.other == "lifted" else 0.0)
         squats = self.cycle_s * np.arange(self.repetitions, dtype=np.float64)
         return first + squats + self.turn_s * np.arange(self.turns, dtype=np.float64)[:, None]
@@ -126,14 +126,14 @@ class Squats:
 
 @dataclass(frozen=True, eq=False)
 class SquatTruth:
-    """Exact truth at the samples of the recording.
+    """Exact ground truth at the samples of the recording.
 
     Parameters
     ----------
-    t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m; the ankle of the foot stands over the origin.
+    t_s : (n,). q : segment → (n, 4), p : segment → (n, 3) m; the ankle of the foot is above the origin.
     angles : name → (n,) rad as in core/angles, anatomical. zero_offset : name → value in standing, rad.
-    phases : "stand", "down", "hold", "up" in turn over the whole take.
-    depths_rad : drawn knee flexion added in each squat, in the order of time.
+    phases : "stand", "down", "hold", "up" in order over the whole recording. depths_rad : random knee flexion
+        added in each squat, in chronological order.
     """
 
     t_s: Floats
@@ -147,13 +147,13 @@ class SquatTruth:
     mounts: Mapping[Segment, Mount]
 
     def subtract_standing(self) -> dict[str, Floats]:
-        """Angles (n,) in rad minus their standing value."""
+        """Angles (n,) in rad minus their value in standing."""
         return {name: values - self.zero_offset[name] for name, values in self.angles.items()}
 
 
 @dataclass(frozen=True, eq=False)
 class SquatSimulation(Recorded):
-    """A recording of squats and what really happened."""
+    """A recording of squats with its ground truth."""
 
     truth: SquatTruth
 
@@ -165,11 +165,12 @@ def simulate_squats(
     setup: RecordingSetup | None = None,
     mounts: Mapping[Segment, Mount] | None = None,
 ) -> SquatSimulation:
-    """Let a person of a height squat, with sensors on foot, shank and thigh of the legs and on the pelvis.
+    """Simulate squats of a person of a height, with sensors on foot, shank and thigh of the legs and on the
+    pelvis.
 
     Parameters
     ----------
-    mounts : how sensors sit; those that are not given are drawn.
+    mounts : position and alignment of sensors; random if not given.
 
     Raises
     ------
@@ -209,7 +210,7 @@ def simulate_squats(
 
 
 def _depth(t: Floats, squats: Squats, starts: Floats, deep: Floats) -> Floats:
-    """How deep (n,) the person is, 0 standing, 1 at the depth asked for."""
+    """Depth (n,) of the squat, 0 in standing, 1 at full depth."""
     depth = np.zeros(len(t))
     down, up = DOWN * squats.moving_s, (1.0 - DOWN) * squats.moving_s
     for start, share in zip(starts, deep, strict=True):
@@ -244,7 +245,7 @@ def _place_body(
 def _stand_and_lift(
     t: Floats, squats: Squats, sides: tuple[Side, Side], turn: int, depth: Floats, anatomy: Anatomy
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
-    """Body that squats on the first side in a turn and lifts the foot of the second."""
+    """Body that squats on the first side of a series and lifts the foot of the second."""
     carries, other = sides
     q, p = _stand_on(squats, carries, depth, anatomy)
     begin = squats.lead_s + turn * squats.turn_s
@@ -269,7 +270,7 @@ def _stand_on(
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
     """Orientations (n, 4) and origins (n, 3) in m of foot, shank, thigh and pelvis, from the floor up.
 
-    The ankle stands over the origin; of two legs each half a hip's width beside it.
+    The ankle is above the origin; with two legs each is displaced laterally by half the hip width.
     """
     inward = SIGN[side] * squats.valgus_rad * depth
     knee = squats.standing_knee_rad + squats.depth_rad * depth

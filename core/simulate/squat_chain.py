@@ -1,4 +1,4 @@
-"""Sensors of a simulated squat where Kianifar et al. put theirs, and the chain that knows it exactly."""
+"""Sensors of a simulated squat placed as in Kianifar et al., and the chain with exact parameters."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ TURNED: Final = radians(10.0)
 
 
 def measure_leg(height_m: float, side: Side) -> LegGeometry:
-    """The leg of the simulated person of a height, measured; what the person has not is nominal.
+    """Body dimensions of the leg of a simulated person of a height; dimensions it does not define are
+    nominal.
 
     Raises
     ------
@@ -38,7 +39,7 @@ def measure_leg(height_m: float, side: Side) -> LegGeometry:
 
 
 def draw_leg(height_m: float, side: Side, seed: int = 0) -> tuple[LegGeometry, dict[Segment, Floats]]:
-    """The leg, with sensors put on by a hand: up to 1 cm aside and 10° off the agreed way, and both known.
+    """The leg, with manually attached sensors: displaced by up to 1 cm and rotated by up to 10°, both known.
 
     Returns
     -------
@@ -53,7 +54,7 @@ def draw_leg(height_m: float, side: Side, seed: int = 0) -> tuple[LegGeometry, d
 
 
 def place_as_agreed(height_m: float, sides: Sequence[Side]) -> dict[Segment, Mount]:
-    """Sensors on the legs of these sides as agreed, and one on the middle of the back."""
+    """Sensors on the legs of these sides as specified by the protocol, and one on the middle of the back."""
     legs = [place_sensors(measure_leg(height_m, side), height_m) for side in sides]
     back = np.mean([leg["pelvis"].position_m for leg in legs], axis=0)
     placed = {segment: mount for leg in legs for segment, mount in leg.items()}
@@ -63,11 +64,11 @@ def place_as_agreed(height_m: float, sides: Sequence[Side]) -> dict[Segment, Mou
 def place_sensors(
     leg: LegGeometry, height_m: float, turned: Mapping[Segment, Floats] | None = None
 ) -> dict[Segment, Mount]:
-    """Sensors on shin, thigh and back of the person of a height.
+    """Sensors on shin, thigh and back of a person of a height.
 
     Parameters
     ----------
-    leg : says where. turned : segment → (3, 3) R_segment_sensor, else as `make_fixed_mounts` says.
+    leg : defines positions. turned : segment → (3, 3) R_segment_sensor, else as in `make_fixed_mounts`.
     """
     hips = Walker.of_height(height_m).anatomy.hip_width
     hip = np.array([0.0, 0.0, 0.5 * leg.outward * hips])

@@ -1,8 +1,8 @@
-"""Quiet standing that sways as an inverted pendulum, with sensors on pelvis and chest
+"""Quiet standing with sway as an inverted pendulum, with sensors on pelvis and chest
 (docs/science/simulation.md, "Sway").
 
-The body is stiff from the ankles up and goes round an ellipse at one frequency, so that every figure of the
-sway has a closed form.
+The body is rigid from the ankles up and moves on an ellipse at one frequency, so that all sway parameters
+have a closed form.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ HEIGHTS_M: Final[dict[Segment, float]] = {"pelvis": 0.95, "chest": 1.30}
 
 @dataclass(frozen=True)
 class Sway:
-    """Lean forward and back and to the sides, rad, as amplitudes, and rounds per second."""
+    """Antero-posterior and lateral lean amplitudes, rad, and cycles per second."""
 
     forward_rad: float = 0.008
     side_rad: float = 0.004
@@ -46,7 +46,7 @@ class Sway:
 
 @dataclass(frozen=True)
 class SwayTruth:
-    """What a sensor at a height above the ankles measures of a sway, in closed form.
+    """Closed-form acceleration of a sensor at a height above the ankles during sway.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ class SwayTruth:
 
     @property
     def jerk(self) -> float:
-        """Half of the squared change of the acceleration over the whole time, m²/s⁵."""
+        """Half of the integrated squared derivative of the acceleration over the whole time, m²/s⁵."""
         return 0.5 * (2.0 * pi * self.sway.frequency_hz * self.rms) ** 2 * self.sway.duration_s
 
 
 @dataclass(frozen=True, eq=False)
 class SwaySimulation(Recorded):
-    """A recording of quiet standing and what really happened, by segment."""
+    """A recording of quiet standing with its ground truth by segment."""
 
     truth: dict[Segment, SwayTruth]
 
@@ -83,7 +83,7 @@ class SwaySimulation(Recorded):
 def simulate_sway(
     sway: Sway | None = None, height_m: float = 1.75, seed: int = 0, setup: RecordingSetup | None = None
 ) -> SwaySimulation:
-    """Let a person of a height stand and sway.
+    """Simulate a person of a height in quiet standing with sway.
 
     Raises
     ------

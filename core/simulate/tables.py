@@ -1,6 +1,6 @@
-"""Truth as plain columns, named like the files of an analysis, SI units and radians.
+"""Ground truth as plain columns, named like the files of an analysis, SI units and radians.
 
-Writing degrees and bytes is the business of the server (spec: one place where degrees exist).
+Conversion to degrees and bytes is the responsibility of the server (a single place where degrees exist).
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ Column = list[float] | list[float | None] | list[str]
 
 
 def angle_table(truth: WalkTruth) -> dict[str, Floats]:
-    """`t_s` and one column (n,) in rad per angle, zeroed to the truth's own standing."""
+    """`t_s` and one column (n,) in rad per angle, relative to the truth in standing."""
     return {"t_s": truth.t_s, **truth.subtract_standing()}
 
 
 def event_table(truth: WalkTruth) -> dict[str, Column]:
-    """`time_s`, `side`, `kind` and `source` of all contacts in order of time.
+    """`time_s`, `side`, `kind` and `source` of all contacts in chronological order.
 
-    Terminal contact has two rows: source "truth_release" (last touch) and "truth_lift5" (sole 5 mm up, what
-    detectors and force plates come close to); compare detectors with the latter
-    (docs/science/simulation.md, "Timing").
+    Terminal contact has two rows: source "truth_release" (last touch) and "truth_lift5" (sole 5 mm up, which
+    detectors and force plates come close to); compare detectors with the latter (docs/science/simulation.md,
+    "Timing").
     """
     rows: list[tuple[float, str, str, str]] = []
     for side in SIDES:

@@ -1,7 +1,7 @@
-"""What really happened: poses, angles, contacts and strides that belong to a simulated recording.
+"""Ground truth: poses, angles, contacts and strides of a simulated recording.
 
-Angles follow the sequence and signs of docs/reference/coordinate-systems.md, taken here from the rotation
-matrices on their own, so that a sign error in core/angles cannot hide.
+Angles follow the sequence and signs of docs/reference/coordinate-systems.md, derived here independently from
+the rotation matrices, so that a sign error in core/angles cannot hide.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class TrueContacts:
 
     Parameters
     ----------
-    heel_off, release : heel rises, contact ends. lift5 : lowest sole point passes 5 mm, NaN if it never does.
-    contact : initial contact. flat : foot flat and still from here to the next heel-off.
+    heel_off, release : heel rise, end of contact. lift5 : lowest sole point exceeds 5 mm, NaN if never.
+    contact : initial contact. flat : start of the flat and still phase, which lasts until the next heel-off.
     """
 
     heel_off: Floats
@@ -48,13 +48,14 @@ class TrueContacts:
 
 @dataclass(frozen=True)
 class TrueStride:
-    """One stride, initial contact to the next of the same foot, without standing in it.
+    """One stride, initial contact to the next of the same foot, without standing in between.
 
     Parameters
     ----------
-    release_s, lift5_s : end of contact in it by the two definitions; lift5_s is None if never 5 mm up.
-    length_m : between the two footprints (ankle over the floor). width_m : the other foot's footprint off
-        that line. turn_rad : heading change of the foot, left positive.
+    release_s, lift5_s : end of contact by the two definitions; lift5_s is None if the sole never reaches 5
+        mm.
+    length_m : between the two footprints (ankle projected to the floor). width_m : distance of the other
+        foot's footprint from that line. turn_rad : heading change of the foot, left positive.
     """
 
     side: Side
@@ -69,7 +70,7 @@ class TrueStride:
 
 @dataclass(frozen=True, eq=False)
 class WalkTruth:
-    """Exact truth at the samples of the recording.
+    """Exact ground truth at the samples of the recording.
 
     Parameters
     ----------
@@ -77,8 +78,8 @@ class WalkTruth:
     angles : name → (n,) rad as in core/angles, anatomical (not zeroed).
     zero : window in s of the first standing. zero_offset : name → its mean angle there, rad.
     contact : side → (n,) the foot touches the floor. flat : side → (n,) it is flat and exactly still.
-    mounts, errors : segment → how its sensor sits and what constant errors it was given.
-    guard_m : largest lowering of the pelvis for a leg out of reach. lifts_m : side → lifts of the swings.
+    mounts, errors : segment → position and alignment of its sensor, and its constant errors. guard_m :
+        largest lowering of the pelvis for a leg out of reach. lifts_m : side → lifts of the swings.
     """
 
     t_s: Floats
@@ -102,7 +103,7 @@ class WalkTruth:
     lifts_m: Mapping[Side, tuple[float, ...]]
 
     def subtract_standing(self) -> dict[str, Floats]:
-        """Angles (n,) in rad minus their own standing value."""
+        """Angles (n,) in rad minus their value in standing."""
         return {name: values - self.zero_offset[name] for name, values in self.angles.items()}
 
 
@@ -113,7 +114,7 @@ def truth_of(
     errors: Mapping[Segment, DrawnErrors],
     seed: int,
 ) -> WalkTruth:
-    """Take every `every`-th sample of a motion as truth, with its events and strides."""
+    """Take every `every`-th sample of a motion as ground truth, with its events and strides."""
     t = motion.t_s[::every]
     q = {s: a[::every] for s, a in motion.q.items()}
     p = {s: a[::every] for s, a in motion.p.items()}
@@ -198,7 +199,7 @@ def _contacts(motion: Motion, side: Side) -> TrueContacts:
 
 
 def _lift5(motion: Motion, side: Side, timing: FootTiming) -> Floats:
-    """First time (swings,) after release with the sole 5 mm up, interpolated; NaN where it never is."""
+    """First time (swings,) after release with the sole 5 mm up, interpolated; NaN if never."""
     t, sole = motion.t_s, motion.sole_height[side]
     out = np.full(len(timing.release), np.nan)
     for i, (release, contact) in enumerate(zip(timing.release, timing.contact, strict=True)):
@@ -211,7 +212,7 @@ def _lift5(motion: Motion, side: Side, timing: FootTiming) -> Floats:
 
 
 def _between(t: Floats, starts: Floats, ends: Floats) -> Bools:
-    """Samples (n,) inside any of the half-open [start, end)."""
+    """Samples (n,) inside any of the half-open ranges [start, end)."""
     inside = np.zeros(len(t), bool)
     for start, end in zip(starts, ends, strict=True):
         inside[np.searchsorted(t, start) : np.searchsorted(t, end)] = True

@@ -1,8 +1,9 @@
 """Timed up and go, and rises from a chair, with sensors on pelvis, legs and chest
 (docs/science/simulation.md, "Timed up and go").
 
-The walker rises, walks out, turns on the spot, walks back, turns and sits down. The truth holds the script's
-changes of posture and, beside them, the segments as a test defines them, by the exact motion of the trunk.
+The walker rises, walks out, turns on the spot, walks back, turns and sits down. The ground truth includes the
+transitions of the script and, separately, the segments of the test as derived from the exact motion of the
+trunk.
 """
 
 from __future__ import annotations
@@ -54,14 +55,14 @@ EDGE: Final = 0.1
 
 @dataclass(frozen=True, eq=False)
 class ChairTruth:
-    """Exact truth at the samples of the recording.
+    """Exact ground truth at the samples of the recording.
 
     Parameters
     ----------
     t_s : (n,). chest_rad : (n,) forward lean of the trunk. height_m : (n,) of the hips.
     heading_rad : (n,) of the path.
-    scripted : rises and ways down as they were asked for. changes : the same from the first to the last
-        visible lean. segments : of a timed up and go, else empty.
+    scripted : rises and sitting down as requested. changes : the same from the start to the end of the lean.
+        segments : of a timed up and go, else empty.
     contacts_s : initial contacts of both feet.
     """
 
@@ -78,13 +79,13 @@ class ChairTruth:
 
     @property
     def duration_s(self) -> float:
-        """From the first visible lean to the last."""
+        """From the start of the first lean to the end of the last."""
         return self.changes[-1].end_s - self.changes[0].start_s
 
 
 @dataclass(frozen=True, eq=False)
 class ChairSimulation(Recorded):
-    """A recording of a test that begins on a chair, and what really happened."""
+    """A recording of a test that begins on a chair, with its ground truth."""
 
     truth: ChairTruth
 
@@ -98,7 +99,7 @@ def simulate_tug(
     walk_m: float = WALK_M,
     left: bool = True,
 ) -> ChairSimulation:
-    """Let a virtual person do a timed up and go.
+    """Simulate a timed up and go test.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ def simulate_chair_rises(
     sit_s: float = 4.0,
     pause_s: float = PAUSE_S,
 ) -> ChairSimulation:
-    """Let a virtual person rise and sit down again and again; `pause_s` is spent in every posture.
+    """Simulate repeated rising and sitting down; `pause_s` is spent in every posture.
 
     Raises
     ------
@@ -199,7 +200,9 @@ def _simulate(
 
 
 def _chest_path(motion: Motion, lean: Floats, above_m: float, mount: Mount) -> SensorPath:
-    """Way of a sensor on a trunk that stands on the pelvis, faces along the path and leans by itself."""
+    """Path of a sensor on a trunk attached to the pelvis, facing along the path, with its own forward
+    lean.
+    """
     q = multiply(multiply(about(2, motion.heading_rad), Q_NEUTRAL), about(2, -lean))
     place = np.array([0.0, above_m, 0.0]) + mount.position_m
     p = motion.p["pelvis"] + rotate(q, place)
@@ -207,7 +210,7 @@ def _chest_path(motion: Motion, lean: Floats, above_m: float, mount: Mount) -> S
 
 
 def _see_change(t: Floats, lean: Floats, change: ChairChange) -> Phase:
-    """The change from where the trunk leans at `EDGE` of its greatest rate to where it no longer does."""
+    """The transition from where the trunk lean rate exceeds `EDGE` of its maximum to where it falls below."""
     inside = (t >= change.start_s) & (t <= change.end_s)
     rate = np.where(inside, np.gradient(lean, t), 0.0)
     forward, back = np.flatnonzero(rate > EDGE * rate.max()), np.flatnonzero(rate < EDGE * rate.min())
@@ -215,9 +218,9 @@ def _see_change(t: Floats, lean: Floats, change: ChairChange) -> Phase:
 
 
 def _segments(motion: Motion, changes: tuple[Phase, ...]) -> tuple[Phase, ...]:
-    """The five segments; a turn lasts while its rate is above half of what is typical of it.
+    """The five segments; a turn lasts while its rate exceeds half of its typical value.
 
-    People turn step by step: the rate is its mean over a step.
+    People turn step by step: the rate is averaged over a step.
     """
     rise, down = changes
     step = max(1, round(motion.plan.typical_step_s * motion.rate_hz))

@@ -1,4 +1,4 @@
-"""Who walks: the lengths of the body and the parameters of the gait, per side where the sides may differ."""
+"""The simulated person: body lengths and gait parameters, per side if sides may differ."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ class Anatomy:
 
     Parameters
     ----------
-    ankle_height : ankle centre above the sole. heel : heel point behind the ankle (positive).
+    ankle_height : ankle centre above the sole. heel : distance of the heel point posterior to the ankle
+        (positive).
     rocker_start : forward of the ankle, where the sole begins to curve up by `rocker_radius`. toe : tip.
     """
 
@@ -57,25 +58,25 @@ class Anatomy:
 
 @dataclass(frozen=True)
 class SideGait:
-    """How one leg walks; phases are fractions of the own stride
-    (docs/science/simulation.md, "Timing", "Target curves").
+    """Gait of one leg; phases are fractions of its own stride (docs/science/simulation.md, "Timing", "Target
+    curves").
 
     Parameters
     ----------
     double_support : opposite contact to own release. flat_from : foot flat after own contact.
     heel_off : phase at which the heel rises. toe_out_rad : foot heading outward of the path.
     contact_pitch_rad : toes up at contact; below 0 the forefoot lands first. push : factor on the foot's
-        pitch at push-off. knee_min_rad : least knee flexion.
+        pitch at push-off. knee_min_rad : minimum knee flexion.
     clearance_m : height of the sole at mid-swing.
     length_factor, time_factor : of this leg's steps.
     knee_stance_rad, knee_swing_rad : added flexion outside swing; commanded peak in swing, None = healthy.
-    knee_wave : share of the flexion wave at loading. hip_factor, ankle_factor : on the target curves.
+    knee_wave : fraction of the flexion wave at loading. hip_factor, ankle_factor : on the target curves.
     hip_swing_rad, ankle_swing_rad : added flexion and dorsiflexion in swing.
     circumduction_rad, hike_rad : added hip abduction, and rise of this side of the pelvis, in swing.
-    trailing_factor : on how far the pelvis is ahead of the middle of the feet when this foot trails. A foot
-        that pushes off weakly keeps its heel low, and its leg does not reach as far back.
+    trailing_factor : on the distance of the pelvis in front of the midpoint of the feet when this foot
+        trails. A foot with weak push-off keeps its heel low, and its leg does not extend as far back.
 
-    Commands are not results: lifts for clearance and the paths of both contacts bend them.
+    These are inputs, not results: lifts for clearance and the contact paths at both ends modify them.
     """
 
     double_support: float = 0.0928
@@ -102,8 +103,9 @@ class SideGait:
 
 @dataclass(frozen=True)
 class Variability:
-    """Standard deviations from step to step; time and length relative
-    (docs/science/simulation.md, "Footprints")."""
+    """Step-to-step standard deviations; time and length relative (docs/science/simulation.md,
+    "Footprints").
+    """
 
     step_time: float = 0.012
     step_length: float = 0.027
@@ -119,22 +121,23 @@ STEADY = Variability(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Walker:
-    """One person's body and gait.
+    """Body and gait of one person.
 
     Parameters
     ----------
     width_m : between the two lines of footprints (ankle centres).
-    forward_m, forward_wave_m : pelvis ahead of the middle of the feet at contact; cos and sin of its double
-        step wave. lateral : share of the stance foot's lateral offset the pelvis moves over it.
+    forward_m, forward_wave_m : distance of the pelvis in front of the midpoint of the feet at contact; cos
+        and sin of its double step wave. lateral : fraction of the stance foot's lateral offset by which the
+        pelvis shifts towards it.
     standing_knee_rad : knee flexion at rest. tilt_rad : added anterior pelvic tilt.
-    reference_step_m : step with amplitude 1; amplitude grows with the step to `amplitude_power`.
+    reference_step_m : step with amplitude 1; amplitude scales with step length to the power of
+        `amplitude_power`.
     rotation_factor, obliquity_factor : on the pelvis curves.
-    tibial_rotation_rad : internal rotation of the shank that comes with a right angle at the knee.
-    lands_rising : the foot pitches up until it touches the floor. People differ in this, and event rules
-        that look for the largest pitch are early by up to 0.1 s without it
-        (docs/science/simulation.md, "Swing foot").
-    impact : how hard the feet land, 1 = as most people at 1.2 m/s.
-    tremor_rad, tremor_hz : half of what the feet turn through all the time, and how often.
+    tibial_rotation_rad : internal rotation of the shank at 90° of knee flexion. lands_rising : the foot
+        pitches up until it touches the floor. People differ in this, and event rules based on the largest
+        pitch are early by up to 0.1 s without it (docs/science/simulation.md, "Swing foot").
+    impact : strength of foot contact, 1 = typical at 1.2 m/s. tremor_rad, tremor_hz : amplitude of a
+        permanent tremor of the feet, and its frequency.
     """
 
     height_m: float = REFERENCE_HEIGHT_M
@@ -164,7 +167,7 @@ class Walker:
         return replace(base, variability=variability or base.variability).scaled_to(height_m)
 
     def scaled_to(self, height_m: float) -> Walker:
-        """The geometrically similar person of another height; all lengths grow alike.
+        """The geometrically similar person of another height; all lengths scale alike.
 
         Raises
         ------
@@ -190,7 +193,7 @@ class Walker:
 
     @property
     def scale(self) -> float:
-        """Size relative to the person the curves were fitted for."""
+        """Size relative to the reference person of the curves."""
         return self.height_m / REFERENCE_HEIGHT_M
 
     def amplitude(self, step_m: float) -> float:

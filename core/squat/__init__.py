@@ -1,1 +1,1 @@
-"""Squats, leg by leg: repetitions and what is measured on them, and how sure the angles are."""
+"""Single-leg squats: repetitions, their measures, and the sensitivity of the angles."""

@@ -1,4 +1,4 @@
-"""Angles of the leg cut at the repetitions; in numpy, for readers of finished analyses too."""
+"""Leg angles cut into repetitions; in numpy, for readers of finished analyses too."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CURVES: Final = (KNEE, "hip_flexion", *INWARD, "ankle_dorsiflexion", "ankle_inve
 
 
 def cut_curves(angles: JointAngles, side: Side, bounds: Sequence[tuple[float, float]]) -> dict[str, Floats]:
-    """`CURVES` and `VALGUS` → (m, 101) rad over m repetitions; those whose angle is known.
+    """`CURVES` and `VALGUS` → (m, 101) rad over m repetitions, for the angles available.
 
     Parameters
     ----------

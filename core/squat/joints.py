@@ -1,4 +1,4 @@
-"""Angles of a chain's joints under the names of core/angles."""
+"""Joint angles of a kinematic chain under the names of core/angles."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ hip, there Flex/Ext first."""
 
 
 def name_joint_angles(angles: Floats, side: Side) -> dict[str, Floats]:
-    """Angles (n,) in rad, anatomical and not from standing, by name with the suffix of the side.
+    """Anatomical angles (n,) in rad, not relative to standing, by name with the suffix of the side.
 
-    Ankle and knee are the chain's own joints with the sign of distal against proximal; the hip turns about
-    its axes in another order than core/angles has (docs/science/squat.md, "Angles").
+    Ankle and knee are the chain's own joints with the sign of distal relative to proximal; the hip rotates
+    about its axes in a different order than core/angles (docs/science/squat.md, "Angles").
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""What is measured on the squats of one leg: depth, times, how the knee falls inward, curves.
+"""Measures of single-leg squats: depth, times, dynamic knee valgus, curves.
 
-Dynamic knee valgus is adduction and internal rotation of the thigh together (Kianifar et al. 2019,
+Dynamic knee valgus combines adduction and internal rotation of the thigh (Kianifar et al. 2019,
 doi:10.1177/2055668318813455; docs/science/squat.md, "Measures").
 """
 
@@ -33,9 +33,9 @@ class SquatSide:
 
     Parameters
     ----------
-    repetitions : every deep bend of the knee. values : measure → (counted,) in its unit, of those that count.
+    repetitions : every deep knee bend. values : measure → (counted,) in its unit, for valid repetitions.
     curves : `CURVES` and `VALGUS` → (counted, 101) rad over the repetition, 0 start, 100 end.
-    parameters : mean and spread of every measure; without repetitions a reason.
+    parameters : mean and spread of every measure; a reason without repetitions.
     """
 
     side: Side
@@ -52,16 +52,17 @@ def measure_squats(
     recording: UniformRecording | None = None,
     params: RepetitionParams | None = None,
 ) -> SquatSide:
-    """Find and measure the squats of one leg; two legs are compared by `sagittal.core.parameters.symmetry`.
+    """Detect and measure the squats of one leg; `sagittal.core.parameters.symmetry` compares two legs.
 
     Parameters
     ----------
-    angles : of `leg`, from standing. recording : to see by its sensor whether the foot stood.
+    angles : of `leg`, relative to standing. recording : its foot sensor shows whether the foot stayed on the
+    floor.
 
     Returns
     -------
-    SquatSide; `parameters` have no value and the reason "no_angles" where the knee has none,
-    "no_repetitions" where nobody squatted, "no_counted_repetitions" where none counts.
+    SquatSide; `parameters` have no value and the reason "no_angles" without knee angles, "no_repetitions"
+    without squats, "no_counted_repetitions" without valid ones.
     """
     suffix = SUFFIX[side]
     own = {name: angles.angles.get(f"{name}_{suffix}") for name in CURVES}
@@ -106,7 +107,7 @@ def _measure(counted: list[Repetition], angles: Mapping[str, Floats], leg: LegMo
 
 
 def _hip_height(leg: LegMotion) -> Floats:
-    """Height (n,) of the hip centre over the ankle, m; NaN before the chain begins."""
+    """Height (n,) of the hip centre above the ankle, m; NaN before the chain filter starts."""
     height = np.full(len(leg.orientations.t_s), np.nan)
     shank, thigh, _ = leg.chain.links(leg.motion.angles)
     knee, hip = leg.chain.offsets[leg.chain.first[1]], leg.chain.offsets[leg.chain.first[2]]
@@ -115,7 +116,7 @@ def _hip_height(leg: LegMotion) -> Floats:
 
 
 def _foot_rate(recording: UniformRecording | None, side: Side) -> Floats | None:
-    """|ω| (n,) of the foot's sensor, its median taken off as bias; None without one."""
+    """|ω| (n,) of the foot sensor with its median subtracted as bias; None without one."""
     sensor = None if recording is None else recording.sensors.get(FOOT[side])
     if sensor is None or not sensor.valid.any():
         return None

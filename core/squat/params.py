@@ -1,4 +1,4 @@
-"""Parameters of everything that is done with a take of squats."""
+"""Parameters of the squat analysis."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from sagittal.core.body.chain.filter import ChainFilterParams
 from sagittal.core.calibration.table_top import TableTopParams
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.squat.repetitions import RepetitionParams
 
 SquatMounting = Literal["fixed_offset", "table_top"]
@@ -15,12 +16,12 @@ SquatMounting = Literal["fixed_offset", "table_top"]
 
 @dataclass(frozen=True)
 class SquatParams:
-    """Of the sensors, the chain's filters, and of what counts as a squat.
+    """Parameters of the sensor alignment, the chain filters and the repetition detection.
 
     Parameters
     ----------
-    mounting : how it is known how the sensors sit: put on as agreed, or carried from the table in the take
-        itself, which then begins with all of them lying there.
+    mounting : source of the sensor-to-segment alignment: attached as specified by the protocol, or tracked
+    from the table within the recording, which must then start with all sensors on the table.
 
     Raises
     ------
@@ -36,5 +37,9 @@ class SquatParams:
         if self.mounting not in get_args(SquatMounting):
             raise ParameterError(
                 "unknown_mounting",
-                f"Mounting '{self.mounting}' is not one of {', '.join(get_args(SquatMounting))}.",
+                Message(
+                    "Mounting '{mounting}' is not one of {join}.",
+                    mounting=self.mounting,
+                    join=", ".join(get_args(SquatMounting)),
+                ),
             )

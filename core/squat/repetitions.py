@@ -1,4 +1,4 @@
-"""Where a squat begins, is deepest and ends, by the flexion of the knee.
+"""Start, lowest point and end of squats, from knee flexion.
 
 docs/science/squat.md, "Repetitions".
 """
@@ -24,15 +24,16 @@ take cut it; a sensor was silent in it; the foot moved."""
 
 @dataclass(frozen=True)
 class RepetitionParams:
-    """What counts as a squat (our choice).
+    """Criteria for a squat (our choice).
 
     Parameters
     ----------
-    least_rad : flexion of the knee beyond that of the straighter position before and after it.
-    edge : share of this flexion at which a repetition begins and ends.
-    level : share at which the knee has come back: a movement that does not reach it is the same repetition.
-    lifted : share of a movement in which the foot may be off the floor.
-    foot_rate : mean rate of the foot's sensor in a repetition, rad/s, from which the foot moved.
+    least_rad : knee flexion relative to the straighter position before and after.
+    edge : fraction of this flexion at which a repetition begins and ends.
+    level : fraction at which the knee counts as extended: without reaching it, a movement belongs to the same
+    repetition.
+    lifted : fraction of a movement in which the foot may be off the floor.
+    foot_rate : mean rate of the foot sensor in a repetition above which the foot counts as moving, rad/s.
 
     Raises
     ------
@@ -61,8 +62,8 @@ class Repetition:
 
     Parameters
     ----------
-    first, bottom, last : samples of its start, its deepest point and its end.
-    excluded : None where it counts, else one of `CODES`.
+    first, bottom, last : samples of its start, lowest point and end.
+    excluded : None if valid, else one of `CODES`.
     """
 
     side: Side
@@ -76,12 +77,12 @@ class Repetition:
 
     @property
     def descent_s(self) -> float:
-        """From the start to the deepest point."""
+        """From the start to the lowest point."""
         return self.bottom_s - self.start_s
 
     @property
     def ascent_s(self) -> float:
-        """From the deepest point to the end."""
+        """From the lowest point to the end."""
         return self.end_s - self.bottom_s
 
 
@@ -93,18 +94,18 @@ def find_repetitions(
     params: RepetitionParams | None = None,
     stands: Bools | None = None,
 ) -> tuple[Repetition, ...]:
-    """Find the squats in the flexion of a knee.
+    """Detect squats from the flexion of a knee.
 
     Parameters
     ----------
-    knee : (n,) rad, NaN where it is not known. t_s : (n,).
-    foot_rate : (n,) |ω| of the sensor on the standing foot, rad/s, None without one.
-    stands : (n,) False where the foot is lifted; None = it never is.
+    knee : (n,) rad, NaN where unknown. t_s : (n,).
+    foot_rate : (n,) |ω| of the sensor on the supporting foot, rad/s, None without one.
+    stands : (n,) False where the foot is lifted; None = never lifted.
 
     Returns
     -------
-    Repetitions in order, those that do not count with their reason. What happens where the knee is not known
-    for the whole way down and up is none.
+    Repetitions in order, excluded ones with their reason. A squat during which the knee is unknown throughout
+    is not detected.
     """
     params = params or RepetitionParams()
     known = np.isfinite(knee)
@@ -134,7 +135,7 @@ def find_repetitions(
 
 
 def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int, int]]:
-    """Of each squat the straightest sample before it, the deepest, and the straightest after it."""
+    """For each squat the straightest sample before it, the deepest, and the straightest after it."""
     # at the ends as straight as ever, so that a squat that the take cuts is a peak too
     low = float(knee.min())
     peaks = find_peaks(np.concatenate(([low], knee, [low])), prominence=params.least_rad) - 1
@@ -155,7 +156,7 @@ def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int
 def _find_edges(
     knee: Floats, before: int, bottom: int, after: int, params: RepetitionParams
 ) -> tuple[int, int]:
-    """Last sample before and first after the deepest one at which the knee is nearly straight again."""
+    """Last sample before and first after the deepest one at which the knee is nearly extended."""
     down, up = knee[before : bottom + 1], knee[bottom : after + 1]
     start = down.min() + params.edge * (knee[bottom] - down.min())
     end = up.min() + params.edge * (knee[bottom] - up.min())

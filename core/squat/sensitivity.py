@@ -1,8 +1,8 @@
-"""How far joint angles move when one measure of the body or one sensor's place or direction is off.
+"""Sensitivity of joint angles to errors in body dimensions and in sensor position and orientation.
 
-One at a time, 24 parameters, as Kianifar et al. 2019 (equation 1, tables 2 and 3); beside their relative
-figure the change of the error itself, for ± 5 % and for steps that also exist where the nominal value is 0
-(docs/science/squat.md, "Sensitivity").
+One at a time, 24 parameters, as Kianifar et al. 2019 (equation 1, tables 2 and 3); in addition to their
+relative sensitivity the change of the error itself, for ± 5 % and for absolute steps that also exist where
+the nominal value is 0 (docs/science/squat.md, "Sensitivity").
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from sagittal.core.calibration.fixed_offset import BACK, FRONT
 from sagittal.core.calibration.standing_leg import find_standing_legs
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import SUFFIX, Bools, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, from_matrix, to_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.squat.joints import JOINTS, name_joint_angles
@@ -74,15 +75,16 @@ GIMBAL: Final = radians(80.0)
 
 @dataclass(frozen=True, eq=False)
 class SquatCase:
-    """A leg of a take, and the angles that its own are held against.
+    """One leg of a recording, with the reference for its angles.
 
     Parameters
     ----------
-    gyr, acc : (n, 3, 3) rad/s, m/s² of shank, thigh and pelvis, biases taken off, from standing on.
+    gyr, acc : (n, 3, 3) rad/s, m/s² of shank, thigh and pelvis, bias-corrected, starting with standing.
     valid : (n, 3). rest_force : (3, 3) m/s² mean over standing.
-    counted : (n,) samples that errors are of: all sensors are there and the foot is on the floor.
-    reference : `JOINTS` → (n,) rad, anatomical or from standing; NaN where there is none.
-    zero : samples whose mean is subtracted from the estimate, where the reference is from standing; None.
+    counted : (n,) samples for which errors are computed: all sensors available and the foot on the floor.
+    reference : `JOINTS` → (n,) rad, anatomical or relative to standing; NaN where undefined.
+    zero : samples whose mean is subtracted from the estimate if the reference is relative to standing, else
+    None.
     """
 
     rate_hz: float
@@ -103,12 +105,12 @@ class SensitivityRow:
 
     Parameters
     ----------
-    name : the paper's. nominal : m or rad, None where it is not defined. unit : "m" or "rad".
-    sensitivity_pct : (7,) of equation 1, mean of both directions; None where `reason` says why: of a nominal
-        value of 0 "parameter_nominal_zero", near a pole of its angles "gimbal". NaN where the error itself is
-        too small to divide by, as it is without a reference.
-    relative_rad : (7,) |change of the RMS error| at ± 5 %, mean of both directions; None like the former.
-    step : m or rad, and absolute_rad : (7,) the same at ± step.
+    name : as in the paper. nominal : m or rad, None if undefined. unit : "m" or "rad".
+    sensitivity_pct : (7,) of equation 1, mean of both directions; None with a `reason`:
+    "parameter_nominal_zero" for a nominal value of 0, "gimbal" near a singularity of its angles. NaN if the
+    error itself is too small to divide by, which includes the case without a reference.
+    relative_rad : (7,) |change of the RMS error| at ± 5 %, mean of both directions; None likewise.
+    step : m or rad. absolute_rad : (7,) the same at ± step.
     """
 
     name: str
@@ -123,7 +125,7 @@ class SensitivityRow:
 
 @dataclass(frozen=True, eq=False)
 class SensitivityTable:
-    """All parameters; errors : (7,) rad, RMS with nominal values."""
+    """All parameters. errors : (7,) rad, RMS with nominal values."""
 
     errors: Floats
     relative: float
@@ -132,18 +134,19 @@ class SensitivityTable:
 
 @dataclass(frozen=True, eq=False)
 class ReferenceAngles:
-    """Angles that somebody else measured.
+    """Joint angles from an external reference system.
 
     Parameters
     ----------
-    t_s : (m,) s on the recording's clock. angles : name with suffix → (m,) rad, anatomical or from standing.
+    t_s : (m,) s on the recording's clock. angles : name with suffix → (m,) rad, anatomical or relative to
+    standing.
     """
 
     t_s: Floats
     angles: Mapping[str, Floats]
 
     def list_missing(self, side: Side) -> list[str]:
-        """Those of the seven angles of a leg that are not there."""
+        """Those of the seven angles of a leg that are missing."""
         names = (f"{joint}_{SUFFIX[side]}" for joint in JOINTS)
         return [name for name in names if name not in self.angles]
 
@@ -156,12 +159,12 @@ def make_case(
     from_standing: bool,
     params: ChainFilterParams | None = None,
 ) -> SquatCase:
-    """A case from a leg of a calibrated take.
+    """Create a case from one leg of a calibrated recording.
 
     Parameters
     ----------
-    reference : None = the leg's own angles with nominal values, so that errors are changes.
-    from_standing : the angles are zeroed on standing; those of a reference are so already.
+    reference : None = the leg's own angles with nominal values, so that errors are pure changes.
+    from_standing : compare angles relative to standing; a reference must already be so.
 
     Raises
     ------
@@ -187,7 +190,10 @@ def make_case(
     if missing := reference.list_missing(side):
         raise EstimationError(
             "no_reference",
-            f"The reference has no {', '.join(missing)}; it needs the seven angles of the leg.",
+            Message(
+                "The reference has no {missing}; it needs the seven angles of the leg.",
+                missing=", ".join(missing),
+            ),
         )
     at = calibrated.recording.t_s[signals.first :]
     found = {
@@ -210,11 +216,11 @@ def analyse_legs(
     params: ChainFilterParams | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> dict[Side, SensitivityTable]:
-    """`analyse_sensitivity` of every leg of a take that the reference has, without one of all.
+    """Run `analyse_sensitivity` for every leg with reference angles, or for all legs without a reference.
 
     Raises
     ------
-    As `make_case` and `analyse_sensitivity`; `no_reference` where the reference has no leg of the take.
+    As `make_case` and `analyse_sensitivity`; `no_reference` if the reference has no leg of the recording.
     """
     legs = [g for g in geometries if reference is None or not reference.list_missing(g.side)]
     found: dict[Side, SensitivityTable] = {}
@@ -237,12 +243,12 @@ def analyse_sensitivity(
     params: ChainFilterParams | None = None,
     progress: Callable[[str, float], None] | None = None,
 ) -> SensitivityTable:
-    """Run the chain with every parameter up and down, one at a time.
+    """Run the chain with every parameter increased and decreased, one at a time.
 
     Parameters
     ----------
-    relative : share of the nominal value. step_m, step_rad : absolute steps.
-    progress : called with each parameter and the share of the work done before it.
+    relative : fraction of the nominal value. step_m, step_rad : absolute steps.
+    progress : called with each parameter and the fraction of work completed.
 
     Raises
     ------
@@ -271,7 +277,7 @@ def analyse_sensitivity(
 def _change(
     case: SquatCase, name: str, step: float, errors: Floats, params: ChainFilterParams | None
 ) -> Floats:
-    """|Change of the errors| (7,) with a parameter off by ± step, mean of both."""
+    """Mean |change of the errors| (7,) for a parameter changed by ± step."""
     both = []
     for by in (step, -step):
         geometry, mounts = _put_off(case, name, by)
@@ -280,7 +286,7 @@ def _change(
 
 
 def _put_off(case: SquatCase, name: str, by: float) -> tuple[LegGeometry, Mapping[Segment, Floats]]:
-    """The model with one parameter off by m or rad."""
+    """The model with one parameter changed by m or rad."""
     if name in LENGTHS:
         field = LENGTHS[name]
         return replace(case.geometry, **{field: getattr(case.geometry, field) + by}), case.mounts
@@ -291,7 +297,7 @@ def _put_off(case: SquatCase, name: str, by: float) -> tuple[LegGeometry, Mappin
 
 
 def _find_nominal(case: SquatCase, name: str) -> tuple[float | None, str | None]:
-    """Nominal value, and why nothing can be 5 % off it."""
+    """Nominal value, and the reason why a relative change is impossible."""
     if name in LENGTHS:
         value = float(getattr(case.geometry, LENGTHS[name]))
         return value, "parameter_nominal_zero" if abs(value) < LEAST_NOMINAL["m"] else None
@@ -317,7 +323,7 @@ def _run(
 def _estimate(
     case: SquatCase, geometry: LegGeometry, mounts: Mapping[Segment, Floats], params: ChainFilterParams | None
 ) -> dict[str, Floats]:
-    """`JOINTS` → angle (n,) rad, from standing where the case is."""
+    """`JOINTS` → angle (n,) rad, relative to standing if the case is."""
     chain = build_leg_chain(geometry, mounts)
     motion = ChainFilter(chain, case.rate_hz, case.rest_force, params).advance(case.gyr, case.acc, case.valid)
     named = name_joint_angles(motion.angles, geometry.side)
@@ -328,7 +334,7 @@ def _estimate(
 
 
 def average_sensitivity(values: Sequence[Floats | None]) -> Floats:
-    """Column means of what is defined, as the last row of the paper's tables; NaN where nothing is."""
+    """Column means over defined values, as the last row of the paper's tables; NaN without any."""
     rows = np.array([v for v in values if v is not None]).reshape(-1, len(JOINTS))
     known = np.isfinite(rows)
     with np.errstate(invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Which legs squat: those that carry the sensors."""
+"""Selection of the legs with the required sensors."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from sagittal.core.signals.recording import UniformRecording
 
 
 def find_squat_sides(recording: UniformRecording) -> tuple[Side, ...]:
-    """The legs that can be followed in a take.
+    """The legs that can be analysed in a squat recording.
 
     Raises
     ------
-    EstimationError `segments_missing` where no leg has sensors on shank and thigh, or the pelvis none.
+    EstimationError `segments_missing` if no leg has sensors on shank and thigh, or the pelvis has none.
     """
     worn = tuple(side for side in SIDES if set(leg_segments(side)) <= set(recording.sensors))
     if not worn:

@@ -1,1 +1,1 @@
-"""The person: lengths, shoes, angles of standing, and the conditions of a walk."""
+"""The subject: body lengths, footwear, standing angles and walking conditions."""

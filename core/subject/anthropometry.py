@@ -1,6 +1,6 @@
-"""Lengths of a body as a tape measures them (docs/science/body-model.md, "Lengths").
+"""Body lengths as measured with a tape (docs/science/body-model.md, "Lengths").
 
-What nobody measured is estimated from the others and from body height (`sagittal.core.body.model.BodyModel`).
+Missing lengths are estimated from the others and from body height (`sagittal.core.body.model.BodyModel`).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Final
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 LIMITS: Final[Mapping[str, tuple[float, float]]] = {
     "leg_m": (0.3, 1.3),
@@ -25,14 +26,14 @@ LIMITS: Final[Mapping[str, tuple[float, float]]] = {
 
 @dataclass(frozen=True)
 class BodyMeasures:
-    """Lengths by tape in m, None = not measured; left and right are taken alike.
+    """Tape-measured lengths in m, None = not measured; left and right are assumed equal.
 
     Parameters
     ----------
     leg_m : anterior superior iliac spine to inner ankle, standing. thigh_m : greater trochanter to the outer
         knee joint line. shank_m : outer knee joint line to outer ankle. ankle_height_m : outer ankle to the
         sole. foot_m : heel to longest toe. pelvis_width_m : between the anterior superior iliac spines.
-    pelvis_depth_m : from their middle to that of the posterior ones.
+    pelvis_depth_m : from their midpoint to that of the posterior ones.
 
     Raises
     ------
@@ -53,25 +54,32 @@ class BodyMeasures:
             if value is not None and not low <= value <= high:
                 raise ParameterError(
                     "length_implausible",
-                    f"{name} {value:g} is outside {low:g} to {high:g} m; give lengths of the body in metres.",
+                    Message(
+                        "{name} {value:g} is outside {low:g} to {high:g} m; give lengths of the body in "
+                        "metres.",
+                        name=name,
+                        value=value,
+                        low=low,
+                        high=high,
+                    ),
                 )
 
     def complete_from(self, other: BodyMeasures) -> BodyMeasures:
-        """What is measured here, and from `other` what is not."""
+        """These measures, with missing ones taken from `other`."""
         known = {f.name: getattr(self, f.name) for f in fields(self)}
         return BodyMeasures(**{k: getattr(other, k) if v is None else v for k, v in known.items()})
 
     def to_json(self) -> dict[str, float]:
-        """What was measured, keys as in a manifest's `subject.measures`."""
+        """The measured lengths, with the keys of a manifest's `subject.measures`."""
         return {name: value for name, value in asdict(self).items() if value is not None}
 
 
 def locate_hips_across(pelvis_width_m: float, pelvis_depth_m: float | None = None) -> float:
-    """Distance in m between the hip centres by the pelvis.
+    """Distance in m between the hip centres, from pelvis dimensions.
 
     References
     ----------
-    Harrington et al. 2007, table 4, written there in mm: of width and depth, or of the width alone;
+    Harrington et al. 2007, table 4, given there in mm: from width and depth, or from the width alone;
     doi:10.1016/j.jbiomech.2006.02.003.
     """
     if pelvis_depth_m is None:

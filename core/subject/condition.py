@@ -1,8 +1,8 @@
-"""How a take was walked, as far as it is not the person: pace, feedback, aid, orthosis, shoes, floor or belt.
+"""Walking condition of a recording: pace, feedback, walking aid, orthosis, footwear, overground or treadmill.
 
-A difference between two takes is a change of the person only where they were walked alike. `is_comparable`
-is that rule; every table, trend and baseline asks it. What nobody stated is None: it is like nothing but
-itself, and the words say so.
+A difference between two recordings is a change of the person only if the conditions were equal.
+`is_comparable` implements that rule for every table, trend and baseline. An unstated item is None: it is
+comparable only to another unstated one, and the wording shows it.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, Literal
 
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 
 WalkingPace = Literal["comfortable", "slow", "fast"]
 WalkingAid = Literal[
@@ -75,13 +76,13 @@ NOT_STATED: Final = "condition not stated"
 
 @dataclass(frozen=True)
 class WalkingCondition:
-    """The condition of a take.
+    """The walking condition of a recording.
 
     Parameters
     ----------
-    pace, aid, orthosis, shoes : of CHOICES; None = nobody stated it.
+    pace, aid, orthosis, shoes : of CHOICES; None = not stated.
     feedback : biofeedback was given while walking.
-    protocol : what was walked. belt_speed_mps : of its treadmill, None = not entered.
+    protocol : walking protocol. belt_speed_mps : treadmill speed, None = not entered.
     """
 
     pace: WalkingPace | None = None
@@ -94,29 +95,29 @@ class WalkingCondition:
 
     @property
     def stated(self) -> dict[str, Any]:
-        """What people state of it, by the names of CHOICES."""
+        """The items to be stated by the user, by the names of CHOICES."""
         return {name: getattr(self, name) for name in CHOICES}
 
     @property
     def unstated(self) -> tuple[str, ...]:
-        """What of it nobody stated, by name."""
+        """Names of the items that were not stated."""
         names = tuple(name for name, value in self.stated.items() if value is None)
         belt = self.protocol == "treadmill" and self.belt_speed_mps is None
         return (*names, "speed of the belt") if belt else names
 
     @property
     def is_at_own_pace(self) -> bool:
-        """Not asked to walk faster or slower, as far as anybody stated."""
+        """Whether the person walked at a self-selected pace, or the pace is unstated."""
         return self.pace in {None, "comfortable"}
 
     @property
     def is_unaided(self) -> bool:
-        """Without feedback, aid and orthosis as far as anybody stated: what may serve others as reference."""
+        """Whether no feedback, aid or orthosis is stated, which makes the recording usable as a reference."""
         return not self.feedback and self.aid in {None, "none"} and self.orthosis in {None, "none"}
 
     @property
     def words(self) -> str:
-        """In words, "own pace, no aid, shoes"; an orthosis only where there is one."""
+        """Description in words, "own pace, no aid, shoes"; an orthosis is mentioned only if used."""
         floor = [] if self.protocol == "walk" else [self._floor]
         told = ["with feedback"] if self.feedback else []
         said = {name: CHOICES[name].get(value or "") for name, value in self.stated.items()}
@@ -128,7 +129,11 @@ class WalkingCondition:
 
     @property
     def _floor(self) -> str:
-        belt = "" if self.belt_speed_mps is None else f" at {self.belt_speed_mps:.2f}\u202fm/s"
+        belt = (
+            ""
+            if self.belt_speed_mps is None
+            else Message(" at {belt_speed_mps:.2f}\u202fm/s", belt_speed_mps=self.belt_speed_mps)
+        )
         return PROTOCOL_WORDS[self.protocol] + belt
 
 
@@ -137,31 +142,41 @@ USUAL: Final = WalkingCondition("comfortable", "none", "none", "shoes")
 
 
 def is_alike(a: WalkingCondition, b: WalkingCondition) -> bool:
-    """Whether two takes were walked under the same condition, feedback aside."""
+    """Whether two recordings have the same condition, apart from feedback."""
     # most are equal, and a list asks thousands of times
     return a == b or not compare_conditions(replace(a, feedback=False), replace(b, feedback=False))
 
 
 def is_comparable(a: WalkingCondition, b: WalkingCondition) -> bool:
-    """Whether a difference between two takes can be called a change: walked alike, neither with feedback."""
+    """Whether a difference between two recordings is a change: equal conditions, neither with feedback."""
     return not a.feedback and not b.feedback and is_alike(a, b)
 
 
 def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, ...]:
-    """How the condition of one take differs from that of a later one, in words: "own pace, then fast"."""
-    found = []
+    """Differences between the conditions of one recording and a later one, in words: "own pace, then
+    fast".
+    """
+    found: list[str] = []
     if a.protocol != b.protocol:
-        found.append(f"{PROTOCOL_WORDS[a.protocol]}, then {PROTOCOL_WORDS[b.protocol]}")
+        found.append(
+            Message(
+                "{protocol}, then {protocol2}",
+                protocol=PROTOCOL_WORDS[a.protocol],
+                protocol2=PROTOCOL_WORDS[b.protocol],
+            )
+        )
     elif not _same_belt(a.belt_speed_mps, b.belt_speed_mps):
         speeds = [
             "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
         ]
-        found.append(f"speed of the belt {speeds[0]}, then {speeds[1]}")
+        found.append(
+            Message("speed of the belt {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1])
+        )
     for name, words in CHOICES.items():
         values = [getattr(c, name) for c in (a, b)]
         if values[0] != values[1]:
-            first, second = (words.get(v or "", f"{name} not stated") for v in values)
-            found.append(f"{first}, then {second}")
+            first, second = (words.get(v or "", Message("{name} not stated", name=name)) for v in values)
+            found.append(Message("{first}, then {second}", first=first, second=second))
     if a.feedback != b.feedback:
         found.append("with feedback, then without" if a.feedback else "without feedback, then with")
     return tuple(found)

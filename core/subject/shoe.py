@@ -1,7 +1,7 @@
-"""The shape of a shoe's sole as a tape measures it: what the clearance of heel and toe is measured on.
+"""Tape-measured shape of a shoe sole, the reference for heel and toe clearance.
 
-It is measured from the sensor: where that sits on the foot is known to a few centimetres only, and a heel
-that is 7 cm wrong along the sole is 6 cm wrong in height when the foot leaves the floor.
+Distances are measured from the sensor: its position on the foot is otherwise known only to a few centimetres,
+and a heel displaced by 7 cm along the sole is 6 cm wrong in height at toe-off.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 LIMITS = {"back_m": (0.0, 0.35), "front_m": (0.0, 0.35), "tip_up_m": (0.0, 0.1)}
 """What a tape can read, m."""
@@ -19,12 +20,12 @@ LENGTHS = (0.1, 0.4)
 
 @dataclass(frozen=True)
 class Shoe:
-    """The sole seen from the side, the foot flat on the floor; m.
+    """Side view of the sole with the foot flat on the floor; m.
 
     Parameters
     ----------
-    back_m, front_m : along the floor from the middle of the foot's sensor backwards to the sole's rear end
-        and forwards to its tip. tip_up_m : how far the tip stands off the floor.
+    back_m, front_m : horizontal distances from the centre of the foot sensor back to the rear end of the sole
+    and forward to its tip. tip_up_m : height of the tip above the floor.
 
     Raises
     ------
@@ -42,6 +43,12 @@ class Shoe:
             if not low <= value <= high:
                 raise ParameterError(
                     "shoe_implausible",
-                    f"{name} {value:g} m is outside {low:g} to {high:g} m; give distances along the sole "
-                    "from the middle of the foot's sensor, in metres.",
+                    Message(
+                        "{name} {value:g} m is outside {low:g} to {high:g} m; give distances along the sole "
+                        "from the middle of the foot's sensor, in metres.",
+                        name=name,
+                        value=value,
+                        low=low,
+                        high=high,
+                    ),
                 )

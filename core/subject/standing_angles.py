@@ -1,8 +1,8 @@
-"""Joint angles of quiet standing as a goniometer reads them: the link from our zero to the anatomical one.
+"""Goniometer angles in quiet standing: the offset between our zero and the anatomical zero.
 
-Our calibration makes the person's own standing the zero (docs/science/joint-angles.md, "Zero"). Who stands
-with a knee bent by 10° has every knee angle 10° too small against any reference, until somebody enters these
-10°.
+The calibration defines the person's own standing posture as zero (docs/science/joint-angles.md, "Zero"). If a
+person stands with 10° of knee flexion, every knee angle is 10° too small compared with references until this
+value is entered.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 PELVIS: Final = ("pelvis_tilt", "pelvis_obliquity")
 """Pelvis angles that standing has a zero for; obliquity is given with the right side up positive."""
@@ -29,7 +30,7 @@ LIMIT_DEG: Final = 60.0
 
 
 def check_standing(standing_deg: Mapping[str, float]) -> None:
-    """Refuse names that no angle has and angles nobody stands with.
+    """Reject unknown angle names and implausible standing angles.
 
     Raises
     ------
@@ -38,10 +39,18 @@ def check_standing(standing_deg: Mapping[str, float]) -> None:
     for name, value in standing_deg.items():
         if name not in NAMES:
             known = ", ".join(NAMES)
-            raise ParameterError("unknown_angle", f"'{name}' is no angle; expected one of {known}.")
+            raise ParameterError(
+                "unknown_angle",
+                Message("'{name}' is no angle; expected one of {known}.", name=name, known=known),
+            )
         if not abs(value) <= LIMIT_DEG:
             raise ParameterError(
                 "standing_angle_implausible",
-                f"{name}: {value:g}° in standing is outside ±{LIMIT_DEG:g}°; give what the goniometer read, "
-                "in degrees.",
+                Message(
+                    "{name}: {value:g}° in standing is outside ±{LIMIT_DEG:g}°; give what the "
+                    "goniometer read, in degrees.",
+                    name=name,
+                    value=value,
+                    LIMIT_DEG=LIMIT_DEG,
+                ),
             )

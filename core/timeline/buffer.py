@@ -1,4 +1,4 @@
-"""The good samples of all worn sensors on their way to the axis of a live take."""
+"""Buffer of the good samples of a live recording that are waiting for the time axis."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Ints = NDArray[np.int64]
 
 
 class SampleBuffer:
-    """Rows of good samples by sensor, the first of them the last that the axis has passed.
+    """Rows of good samples by sensor, the first of them the last one before the current end of the axis.
 
     Parameters
     ----------
-    widths : number of sensors of each stream; sensors are numbered through the streams. rates_hz : of each
-        stream. rate_hz : of the axis.
+    widths : number of sensors of each stream; sensors are numbered consecutively across streams. rates_hz :
+        of each stream. rate_hz : of the axis.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class SampleBuffer:
     def append(
         self, stream: int, t_us: Micros, offset_us: int, samples: NDArray[np.float32], columns: Ints
     ) -> None:
-        """Add samples (m, sensors, 9) of a stream, of which `columns` are worn, on the common clock."""
+        """Add samples (m, sensors, 9) of a stream, of its used `columns`, on the common clock."""
         slot = self._slots[stream]
         need = int(self._count[slot : slot + len(columns)].max()) + len(t_us)
         if need > self._t.shape[1]:
@@ -52,12 +52,12 @@ class SampleBuffer:
         self.last_s[stream] = (int(t_us[-1]) + offset_us) * 1e-6
 
     def until(self, live: Bools) -> float:
-        """Time in s up to which the axis is known when only the live streams (m,) are waited for."""
+        """Time in s up to which the axis can be computed if only the live streams (m,) are waited for."""
         gap = self._params.max_gap_s
         return float(find_known_until(live, self.last_s, self._stream, self._step, gap, self._t, self._count))
 
     def lay(self, first: int, past: int, start_s: float) -> tuple[Floats, Floats, Bools, Bools]:
-        """acc, gyr (T, n, 3), valid, interpolated (T, n) of the axis' points first … past − 1."""
+        """acc, gyr (T, n, 3), valid, interpolated (T, n) at the points first … past − 1 of the axis."""
         shape = past - first, len(self._count)
         out = np.empty((2, *shape, 3))
         valid, filled = np.empty(shape, np.bool_), np.empty(shape, np.bool_)

@@ -1,4 +1,4 @@
-"""Sensors of a block by their columns: most often all of them, as they stand."""
+"""Selection of sensor columns in a block; usually all of them in order."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ Columns = NDArray[np.int64] | None
 
 
 def find_columns(wanted: Sequence[Segment], there: Sequence[Segment]) -> Columns:
-    """Where some segments stand among others."""
+    """Columns of some segments among others."""
     if tuple(wanted) == tuple(there):
         return None
     return np.array([there.index(s) for s in wanted], np.int64)
 
 
 def take_mask(mask: Bools, columns: Columns) -> Bools:
-    """A mask (T, n) of some columns, laid out as in `take_columns`."""
+    """Some columns of a mask (T, n), in the memory layout of `take_columns`."""
     return mask if columns is None else mask.take(columns, axis=1)
 
 
 def take_columns(acc: Floats, gyr: Floats, valid: Bools, columns: Columns) -> tuple[Floats, Floats, Bools]:
     """acc, gyr (T, n, 3), valid (T, n) of some columns.
 
-    Laid out in order, as `take` does and an index would not: another layout is another kernel.
+    In C order, as from `take` and unlike indexing: another memory layout would compile another kernel.
     """
     if columns is None:
         return acc, gyr, valid

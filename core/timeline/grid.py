@@ -1,8 +1,9 @@
-"""Samples at their own times → points of the uniform axis: the one rule for a file and a live take.
+"""Samples at their own times → points of the uniform axis: the same rule for files and live recordings.
 
-A point on a sample is a copy of it, any other is interpolated linearly; in a hole longer than `max_gap_s` it
-is invalid and holds the last value (docs/science/timeline.md, "Rule"). Rows of good samples go in by sensor,
-the first of them the last one that the axis has passed. A file is one call over all of its points.
+A point that coincides with a sample is a copy of it, any other is interpolated linearly; in a gap longer than
+`max_gap_s` it is invalid and holds the last value (docs/science/timeline.md, "Rule"). The input are rows of
+good samples by sensor, the first of them the last one before the current end of the axis. A file is one call
+over all of its points.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ MEASURED: Final = 6
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def append_good(t_us, offset_us, samples, columns, slot, t, x, count):  # type: ignore[no-untyped-def]
-    """Add the good samples (m, sensors, 9) of some columns to the rows from `slot` on."""
+    """Append the good samples (m, sensors, 9) of some columns to the rows from `slot` on."""
     for i in range(len(columns)):
         s, column = slot + i, columns[i]
         for k in range(len(t_us)):
@@ -40,9 +41,9 @@ def append_good(t_us, offset_us, samples, columns, slot, t, x, count):  # type: 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def find_known_until(live, last_s, stream, step, max_gap, t, count):  # type: ignore[no-untyped-def]
-    """Time up to which every sensor of the live streams can be laid.
+    """Time up to which every sensor of the live streams can be resampled.
 
-    Up to its last good sample; beyond, once the hole is too long to be filled by any sample to come.
+    This is its last good sample, or later once the gap is too long to be interpolated.
     """
     until = np.inf
     for s in range(len(stream)):
@@ -58,13 +59,13 @@ def find_known_until(live, last_s, stream, step, max_gap, t, count):  # type: ig
 def lay_points(  # type: ignore[no-untyped-def]
     first, start, rate, slack, step, max_gap, t, x, count, out, valid, filled
 ):
-    """Write the points from `first` on and drop the rows that no later point needs.
+    """Write the points from `first` on and drop the rows that later points do not need.
 
     Parameters
     ----------
-    start, rate : time in s of point 0, points per second. slack : s, a sample so near is on the point. step :
-    (n,) s between samples of each sensor. t : (n, rows) s, x : (n, rows, 3 g) good samples of each sensor, of
-    which the first `count` (n,) are there; all three are advanced in place.
+    start, rate : time in s of point 0, points per second. slack : s, tolerance for a sample to coincide with
+        a point. step : (n,) s between samples of each sensor. t : (n, rows) s, x : (n, rows, 3 g) good
+        samples of each sensor, of which the first `count` (n,) are filled; all three are advanced in place.
     out : (g, T, n, 3), valid, filled : (T, n) written.
     """
     for s in range(len(count)):
@@ -105,16 +106,16 @@ def lay_signal(
     rate_hz: float,
     params: TimelineParams,
 ) -> tuple[Floats, Bools, Bools]:
-    """Lay all of one sensor's signals at once.
+    """Resample all signals of one sensor at once.
 
     Parameters
     ----------
-    t_s : (m,) strictly increasing times of its good samples, x : (m, 3 g) their channels. own_rate : Hz of
+    t_s : (m,) strictly increasing times of its good samples. x : (m, 3 g) their channels. own_rate : Hz of
         these. start_s, samples, rate_hz : of the axis.
 
     Returns
     -------
-    Values (g, samples, 3), before the first sample those of it; valid, filled (samples,).
+    Values (g, samples, 3), constant before the first sample; valid, filled (samples,).
     """
     t = np.concatenate(([NEVER_S], t_s))[None]
     rows = np.concatenate((x[:1], x)).astype(np.float64, copy=False)[None]

@@ -1,9 +1,9 @@
 """Batches of several device clocks → ONE uniform axis, sample by sample.
 
 The rules are those of a file: highest rate, common start, samples on the axis copied, others interpolated,
-holes of up to 0.1 s filled. A point is given out once every stream has what it needs for it, so
-on a clean take the axis equals that of the finished file bit for bit. What a file needs no rule for: a stream
-that falls silent is passed over, its sensors are invalid until it returns.
+gaps of up to 0.1 s filled. A point is output once every stream has the required samples, so for a recording
+without disturbances the axis equals that of the finished file bit for bit. One rule has no equivalent in
+files: a stream without data is skipped, and its sensors are invalid until it returns.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sagittal.core.formats.live_log import (
     encode_batch,
 )
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.timeline.buffer import SampleBuffer
 from sagittal.core.timeline.params import TimelineParams
 from sagittal.core.timeline.queue import StreamQueue
@@ -36,13 +37,14 @@ class LiveAxisParams:
 
     Parameters
     ----------
-    silent_s : a stream overdue by so much, by the sender's clock, is passed over; longer than any hole that
-        is interpolated, shorter than the 0.5 s after which the patient is told that the picture stands still.
-    wait_s : for streams that are not heard from the beginning. Own clocks need one second to be aligned.
-    behind_s : a stream further behind the others than any radio holds samples back is passed over too.
-    jump_s : a clock may be ahead of what the sender's clock shows by so much. longest_s : longest pause of a
-        stream. Beyond either a batch is left out, so that no number in it makes the axis endless.
-    All are our choice.
+    silent_s : a stream overdue by this time, by the sender's clock, is skipped; longer than any interpolated
+        gap, shorter than the 0.5 s after which the patient is informed that the display is frozen.
+    wait_s : waiting time at the start for streams without data. Independent clocks need one second to be
+        aligned.
+    behind_s : a stream with a longer delay than any radio link causes is skipped too.
+    jump_s : largest lead of a clock relative to the sender's clock. longest_s : longest pause of a stream.
+    Batches that exceed either are dropped, so that no invalid number can make the axis endless. All are our
+    choice.
     """
 
     timeline: TimelineParams = field(default_factory=TimelineParams)
@@ -59,12 +61,12 @@ class UniformBlock:
 
     Parameters
     ----------
-    first : index of the first one on the axis; blocks follow each other without a hole.
+    first : index of the first one on the axis; blocks are contiguous.
     t_s : (T,) seconds from the first sample of the axis, as `UniformRecording.t_s`.
-    acc, gyr : (T, n, 3) m/s², rad/s of the n worn sensors in the order of `LiveAxis.segments`; finite
-        everywhere, invalid samples hold the last value (0 before the first).
+    acc, gyr : (T, n, 3) m/s², rad/s of the n sensors in the order of `LiveAxis.segments`; always finite,
+        invalid samples hold the last value (0 before the first).
     valid : (T, n) measured or interpolated over ≤ 0.1 s. interpolated : (T, n) filled.
-    out : (T, n) of a sensor that was found not to measure and is left out for good; None = nobody looked.
+    out : (T, n) of a sensor that was found not to measure and is permanently excluded; None = not checked.
     """
 
     first: int
@@ -80,11 +82,11 @@ class UniformBlock:
 
 
 class LiveAxis:
-    """The axis of a live take: a pure function of its batches in order.
+    """The axis of a live recording: a pure function of its batches in order.
 
     Parameters
     ----------
-    hello : its streams; only sensors with a segment are laid on the axis.
+    hello : its streams; only sensors with a segment are used.
 
     Raises
     ------
@@ -114,11 +116,11 @@ class LiveAxis:
 
     @property
     def length(self) -> int:
-        """Samples of the axis so far."""
+        """Number of samples on the axis so far."""
         return self._next
 
     def push(self, batch: SampleBatch) -> UniformBlock | None:
-        """Take the next batch; the samples of the axis that are now known, None when none is."""
+        """Add the next batch; returns the newly available samples of the axis, None without any."""
         rate = self._rates[batch.stream]
         t_us = sample_times_us(batch, rate)
         self._clock.push(batch.stream, int(t_us[0]), int(t_us[-1]), batch.sent_us)
@@ -149,7 +151,9 @@ class LiveAxis:
         return fresh
 
     def _begin(self) -> bool:
-        """Fix origin and start once all streams are there, or those that came in time; False before that."""
+        """Set origin and start once all streams, or those that arrived in time, have data; False before
+        that.
+        """
         assert self._sent is not None  # noqa: S101 - set before the first call
         assert self._origin is not None  # noqa: S101
         heard = [x for x in self._queues.values() if x.held and self._clock.offset_us(x.stream) is not None]
@@ -167,7 +171,7 @@ class LiveAxis:
         return True
 
     def _emit(self) -> UniformBlock | None:
-        """Lay what is known on the axis."""
+        """Resample all available data onto the axis."""
         assert self._start_s is not None  # noqa: S101 - set before the first call
         assert self._sent is not None  # noqa: S101
         p, last_s = self.params, self._buffer.last_s
@@ -187,7 +191,7 @@ class LiveAxis:
         return UniformBlock(first, t_s, *self._buffer.lay(first, past, self._start_s))
 
     def _is_jump(self, queue: StreamQueue, first_us: int, sent_us: int) -> bool:
-        """Tell whether a batch is too far ahead of its stream to be believed."""
+        """Whether a batch is implausibly far ahead of its stream."""
         ahead_s = queue.ahead_s(first_us)
         allowed = max(0.0, queue.overdue_s(sent_us)) + self.params.jump_s
         stretch = self.params.timeline.max_stretch * queue.samples / queue.rate_hz + self.params.longest_s
@@ -197,10 +201,15 @@ class LiveAxis:
         return True
 
     def _notify(self, code: str, queue: StreamQueue, what: str) -> None:
-        """Say something of a stream once."""
+        """Add a notice about a stream, once."""
         if (code, queue.stream) in self._notified:
             return
-        notice = Notice(code, f"{', '.join(queue.ids)} {what}", queue.ids[0], self._next / self.rate_hz)
+        notice = Notice(
+            code,
+            Message("{ids} {what}", ids=", ".join(queue.ids), what=what),
+            queue.ids[0],
+            self._next / self.rate_hz,
+        )
         self._notified[code, queue.stream] = notice
         self._fresh.append(notice)
 
@@ -209,21 +218,31 @@ def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelinePa
     if not queues:
         named = ", ".join(x.id for x in hello.sensors)
         raise SignalError(
-            "no_mapping", f"No sensor is worn on a segment; say which one is where (sensors: {named})."
+            "no_mapping",
+            Message(
+                "No sensor is worn on a segment; say which one is where (sensors: {named}).", named=named
+            ),
         )
     slowest = min(queues, key=lambda x: x.rate_hz)
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {slowest.ids[0]} sends {slowest.rate_hz:g} Hz; at least {params.min_rate_hz:g} Hz are "
-            "needed to find foot contacts. Set it to 60 Hz or more.",
+            Message(
+                "Sensor {ids} sends {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are needed to find "
+                "foot contacts. Set it to 60 Hz or more.",
+                ids=slowest.ids[0],
+                rate_hz=slowest.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=slowest.ids[0],
         )
     return max(x.rate_hz for x in queues)
 
 
 def compile_axis_kernels() -> None:
-    """Compile or load the kernels, for samples that look into a frame as decoded ones do."""
+    """Compile the kernels or load them from the cache, for samples with the memory layout of decoded
+    frames.
+    """
     hello = Hello("", "cli", (StreamInfo(0, 100.0, "shared", (SensorInfo("", "pelvis"),)),))
     axis = LiveAxis(hello)
     for seq in range(2):

@@ -1,4 +1,4 @@
-"""Limits of the common axis, the same for a file and a live take."""
+"""Limits of the common axis, the same for files and live recordings."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ class TimelineParams:
 
     Parameters
     ----------
-    max_gap_s : longest missing stretch that is interpolated (docs/science/timeline.md, "Parameters").
-    min_rate_hz : below, contacts cannot be found (docs/science/timeline.md, "Parameters").
-    min_duration_s : shorter takes cannot hold 1 s of rest and two strides [our choice].
-    min_share : a sensor that lasts less than this share of the median duration does not cut the take for the
-        others; it is invalid where it has no samples [our choice].
-    max_stretch : samples of the axis per recorded sample; beyond, the clock must have jumped [our choice].
-    on_grid : largest distance from the axis, in samples, at which a sample counts as lying on it.
+    max_gap_s : longest interpolated gap (docs/science/timeline.md, "Parameters").
+    min_rate_hz : minimum rate for contact detection (docs/science/timeline.md, "Parameters").
+    min_duration_s : shorter recordings cannot contain 1 s of rest and two strides [our choice].
+    min_share : a sensor shorter than this fraction of the median duration does not shorten the recording for
+        the others; it is invalid where it has no samples [our choice].
+    max_stretch : largest ratio of axis samples to recorded samples; above it the clock must have jumped [our
+        choice].
+    on_grid : largest distance from the axis, in samples, at which a sample counts as coincident.
     """
 
     max_gap_s: float = 0.1

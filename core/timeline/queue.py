@@ -1,4 +1,4 @@
-"""One stream of a live take before it is laid on the axis: its clock so far, and batches that wait for it."""
+"""One stream of a live recording before resampling: its clock so far, and queued batches."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LONGEST_SPAN_US: Final = 1_000_000
 
 
 class StreamQueue:
-    """The worn sensors of one stream."""
+    """Queue of the sensors of one stream that are mapped to a segment."""
 
     def __init__(self, info: StreamInfo) -> None:
         worn = [i for i, x in enumerate(info.sensors) if x.segment is not None]
@@ -32,7 +32,7 @@ class StreamQueue:
         self._span_us = 0
 
     def hold(self, t_us: Micros, batch: SampleBatch) -> bool:
-        """Take a batch; tell whether samples of it ran backwards in time and were left out."""
+        """Add a batch; returns whether samples with decreasing times were dropped."""
         if not self.heard:
             self.heard, self.first_us = True, int(t_us[0])
             self._last_us = self.first_us - 1
@@ -51,13 +51,13 @@ class StreamQueue:
         return backwards
 
     def ahead_s(self, first_us: int) -> float:
-        """How far a batch that begins at this device time is after the last sample."""
+        """Time from the last sample to a batch that begins at this device time."""
         return (first_us - self._last_us) * 1e-6 if self.heard else 0.0
 
     def whole_s(self, first_us: int) -> float:
-        """How far a batch that begins at this device time is after the first sample."""
+        """Time from the first sample to a batch that begins at this device time."""
         return (first_us - self.first_us) * 1e-6 if self.heard else 0.0
 
     def overdue_s(self, now_us: int) -> float:
-        """How long, by the sender's clock, the next batch could have been there; inf before the first."""
+        """Delay of the next batch by the sender's clock; inf before the first."""
         return (now_us - self._sent_us - self._span_us) * 1e-6 if self.heard else np.inf

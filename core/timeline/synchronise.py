@@ -1,8 +1,8 @@
 """The sensors of a file on one uniform axis.
 
-Every sensor is laid on the axis of the take by its own times: samples that fall on it are copied bit for bit,
-others are interpolated linearly. Holes of up to 0.1 s are interpolated and flagged, longer ones are invalid
-and hold the last value (docs/science/timeline.md, "Rule").
+Every sensor is resampled to the axis of the recording by its own times: samples that coincide with it are
+copied bit for bit, others are interpolated linearly. Gaps of up to 0.1 s are interpolated and flagged, longer
+ones are invalid and hold the last value (docs/science/timeline.md, "Rule").
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
 from sagittal.core.frames import Bools, Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.signals.held_samples import is_complete
 from sagittal.core.signals.recording import ImuStream, Recording, SensorSignals, UniformRecording
 from sagittal.core.timeline.grid import lay_signal
@@ -20,16 +21,15 @@ from sagittal.core.timeline.params import TimelineParams
 
 
 def synchronise(recording: Recording, params: TimelineParams | None = None) -> UniformRecording:
-    """Lay all sensors that are worn on a segment on one uniform axis.
+    """Resample all sensors mapped to a segment onto one uniform axis.
 
-    The axis starts with the latest and ends with the earliest of the sensors that last, at the highest rate
+    The axis starts with the latest and ends with the earliest of the full-length sensors, at the highest rate
     among them; time 0 is its first sample.
 
     Raises
     ------
-    SignalError
-        recording_too_long, no_mapping, missing_gyro (no usable sensor), duplicate_stream, no_common_clock,
-        sample_rate_too_low, no_overlap, too_short, clock_jump.
+    SignalError recording_too_long, no_mapping, missing_gyro (no usable sensor), duplicate_stream,
+        no_common_clock, sample_rate_too_low, no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
     worn = _find_worn(recording)
@@ -45,9 +45,15 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     if n > params.max_stretch * most:
         raise SignalError(
             "clock_jump",
-            f"The sensors' clock spans {end - start:.0f} s, {n} samples at {rate:g} Hz, but at most "
-            f"{most} were recorded: "
-            "the counter or time column jumps. Export the recording again.",
+            Message(
+                "The sensors' clock spans {start:.0f} s, {value} samples at {rate:g} Hz, but at "
+                "most {most} were recorded: the counter or time column jumps. Export the recording "
+                "again.",
+                start=end - start,
+                value=n,
+                rate=rate,
+                most=most,
+            ),
         )
     sensors = {segment: _lay_sensor(s, start, n, rate, params) for segment, s in usable.items()}
     return UniformRecording(
@@ -63,7 +69,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
 
 
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
-    """The sensors that are worn on a segment."""
+    """The sensors mapped to a segment."""
     worn = {
         s: recording.streams[d]
         for d, s in recording.segments.items()
@@ -73,43 +79,57 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
     if too_long:  # nor are the others analysed as if it had not been worn
         raise SignalError(
             "recording_too_long",
-            f"The recording of “{'”, “'.join(too_long)}” is too long for the protocol "
-            f"'{recording.protocol}'. Cut out the walk, or choose daily life (activity) for a sensor on the "
-            "trunk.",
+            Message(
+                "The recording of “{too_long}” is too long for the protocol '{protocol}'. Cut out "
+                "the walk, or choose daily life (activity) for a sensor on the trunk.",
+                too_long="”, “".join(too_long),
+                protocol=recording.protocol,
+            ),
         )
     if not worn:
         raise SignalError(
             "no_mapping",
-            "No sensor is assigned to a segment; say which sensor is worn where "
-            f"(sensors found: {', '.join(recording.streams)}).",
+            Message(
+                "No sensor is assigned to a segment; say which sensor is worn where (sensors found: "
+                "{streams}).",
+                streams=", ".join(recording.streams),
+            ),
         )
     return worn
 
 
 def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
-    """Those with a gyroscope."""
+    """The sensors with a gyroscope."""
     usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
     if not usable:
         raise SignalError(
             "missing_gyro",
-            f"None of the {len(worn)} sensors has a gyroscope signal, so no orientation can be computed. "
-            "Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+            Message(
+                "None of the {worn} sensors has a gyroscope signal, so no orientation can be "
+                "computed. Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
+                worn=len(worn),
+            ),
         )
     return usable
 
 
 def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:
-    """Two segments cannot have moved identically: one of the files is a copy under another id."""
+    """Reject identical signals on two segments: one of the files is a copy under another id."""
     seen: dict[str, Segment] = {}
     for segment, s in worn.items():
         first = seen.setdefault(s.digest, segment)
         if first != segment:
             raise SignalError(
                 "duplicate_stream",
-                f"Sensors {worn[first].device_id} ({first}) and {s.device_id} ({segment}) hold identical "
-                "samples: "
-                "one is a copy under another id. Keep the one that was worn there, set the other to 'not "
-                "used'.",
+                Message(
+                    "Sensors {device_id} ({first}) and {device_id2} ({segment}) hold identical samples: "
+                    "one is a copy under another id. Keep the one that was worn there, set the other to "
+                    "'not used'.",
+                    device_id=worn[first].device_id,
+                    first=first,
+                    device_id2=s.device_id,
+                    segment=segment,
+                ),
                 sensor=s.device_id,
             )
 
@@ -120,22 +140,29 @@ def _check_clocks(usable: dict[Segment, ImuStream]) -> None:
         listed = ", ".join(f"{s.device_id}: {s.clock}" for s in usable.values())
         raise SignalError(
             "no_common_clock",
-            f"The sensors are timed in different ways ({listed}) and cannot be aligned; "
-            "give all of them with a packet counter or with a time column.",
+            Message(
+                "The sensors are timed in different ways ({listed}) and cannot be aligned; give all "
+                "of them with a packet counter or with a time column.",
+                listed=listed,
+            ),
         )
 
 
 def _common_rate(usable: dict[Segment, ImuStream], params: TimelineParams) -> tuple[float, list[Notice]]:
-    """Highest rate among the sensors: nothing is thrown away and nothing can alias."""
+    """Highest rate among the sensors: no samples are discarded and no aliasing occurs."""
     rates = {segment: s.rate_hz for segment, s in usable.items()}
     rate = max(rates.values())
     slowest = min(usable.values(), key=lambda s: s.rate_hz)
     if slowest.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
-            f"Sensor {slowest.device_id} was recorded at {slowest.rate_hz:g} Hz; at least "
-            f"{params.min_rate_hz:g} Hz "
-            "are needed to find foot contacts. Record again at 60 Hz or more.",
+            Message(
+                "Sensor {device_id} was recorded at {rate_hz:g} Hz; at least {min_rate_hz:g} Hz are "
+                "needed to find foot contacts. Record again at 60 Hz or more.",
+                device_id=slowest.device_id,
+                rate_hz=slowest.rate_hz,
+                min_rate_hz=params.min_rate_hz,
+            ),
             sensor=slowest.device_id,
         )
     if rate - slowest.rate_hz <= 1e-3 * rate:
@@ -144,7 +171,11 @@ def _common_rate(usable: dict[Segment, ImuStream], params: TimelineParams) -> tu
     return rate, [
         Notice(
             "rates_differ",
-            f"Sensors run at different rates ({listed}); all were interpolated to {rate:g} Hz.",
+            Message(
+                "Sensors run at different rates ({listed}); all were interpolated to {rate:g} Hz.",
+                listed=listed,
+                rate=rate,
+            ),
         )
     ]
 
@@ -161,22 +192,35 @@ def _common_range(
         listed = ", ".join(f"{k} {a:.1f} to {b:.1f} s" for k, (a, b) in spans.items())
         raise SignalError(
             "no_overlap",
-            f"The sensors were never recording at the same time ({listed}); "
-            "the files seem to come from different takes.",
+            Message(
+                "The sensors were never recording at the same time ({listed}); the files seem to "
+                "come from different takes.",
+                listed=listed,
+            ),
         )
     if end - start < params.min_duration_s:
         raise SignalError(
             "too_short",
-            f"Only {end - start:.1f} s were recorded by all sensors together; at least "
-            f"{params.min_duration_s:g} s "
-            "are needed (1 s of quiet standing and two strides). Record a longer take.",
+            Message(
+                "Only {start:.1f} s were recorded by all sensors together; at least {min_duration_s:g} "
+                "s are needed (1 s of quiet standing and two strides). Record a longer take.",
+                start=end - start,
+                min_duration_s=params.min_duration_s,
+            ),
         )
     notices = [
         Notice(
             "unequal_lengths",
-            f"Sensor {usable[k].device_id} on {k} recorded from {max(a - start, 0.0):.1f} to "
-            f"{min(b, end) - start:.1f} s "
-            f"of {end - start:.1f} s; {k} has no data for the rest.",
+            Message(
+                "Sensor {device_id} on {value} recorded from {max:.1f} to {min:.1f} s of {start:.1f} "
+                "s; {value2} has no data for the rest.",
+                device_id=usable[k].device_id,
+                value=k,
+                max=max(a - start, 0.0),
+                min=min(b, end) - start,
+                start=end - start,
+                value2=k,
+            ),
             k,
             max(min(b, end) - start, 0.0),
         )
@@ -188,8 +232,12 @@ def _common_range(
         notices.append(
             Notice(
                 "cropped",
-                f"The sensors did not start and stop together. Left out, as only some of them recorded "
-                f"it: {start - first:.1f} s at the start, {last - end:.1f} s at the end.",
+                Message(
+                    "The sensors did not start and stop together. Left out, as only some of them "
+                    "recorded it: {first:.1f} s at the start, {end:.1f} s at the end.",
+                    first=start - first,
+                    end=last - end,
+                ),
                 severity="info",
             )
         )
@@ -199,12 +247,15 @@ def _common_range(
 def _lay_sensor(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> SensorSignals:
-    """One sensor on the axis of so many samples."""
+    """One sensor resampled onto an axis of this many samples."""
     good = is_complete(s.held("acc")) & is_complete(s.held("gyr"))
     if not good.any():
         raise SignalError(
             "bad_signal",
-            f"Sensor {s.device_id} has no sample with both acceleration and angular rate; export it again.",
+            Message(
+                "Sensor {device_id} has no sample with both acceleration and angular rate; export it again.",
+                device_id=s.device_id,
+            ),
             sensor=s.device_id,
         )
     mag = _lay_magnetometer(s, start_s, samples, rate, params)
@@ -228,9 +279,9 @@ def _lay_sensor(
 
 
 def _hold_once(laid: Floats, own: Floats) -> Floats:
-    """The stream's own memory from the first point on, where every point is a sample of it.
+    """The stream's own memory from the first point on, if every point is one of its samples.
 
-    Not where its rows do not lie one after the other: sums over them would round otherwise.
+    Not for non-contiguous rows, over which sums would round differently.
     """
     own = own[: len(laid)]
     return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
@@ -239,9 +290,9 @@ def _hold_once(laid: Floats, own: Floats) -> Floats:
 def _lies_on_axis(
     t_s: Floats, good: Bools, first: int, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> bool:
-    """Whether every point of the axis has one good sample on it, that of row `first` the first, and so on.
+    """Whether every point of the axis coincides with one good sample, starting with row `first`.
 
-    Told in the words of `lay_points`, so that rounding decides alike.
+    Expressed as in `lay_points`, so that rounding gives the same decision.
     """
     past, slack = first + samples, params.on_grid / rate
     if past > len(t_s) or not good[first:past].all():
@@ -254,7 +305,7 @@ def _lies_on_axis(
 def _lay_magnetometer(
     s: ImuStream, start_s: float, samples: int, rate: float, params: TimelineParams
 ) -> Floats | None:
-    """The magnetometer has its own holes and never makes a sample invalid; None when mostly missing."""
+    """The magnetometer has its own gaps and never makes a sample invalid; None if mostly missing."""
     mag = s.held("mag")
     if mag is None:
         return None

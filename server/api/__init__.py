@@ -1,1 +1,1 @@
-"""One router per resource; JSON under /api/v1."""
+"""JSON API under /api/v1, one router per resource."""

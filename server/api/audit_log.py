@@ -1,4 +1,4 @@
-"""The audit trail, for administrators."""
+"""Audit trail, for administrators."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ router = APIRouter(prefix="/audit", tags=["audit"])
 
 
 @router.get("/head", response_model=schemas.AuditHead)
-def read_head(db: Db, who: Annotated[Identity, require(Action.READ_AUDIT)]) -> schemas.AuditHead:
-    """The newest row's number and hash, to be kept outside of the server (`sagittal check --head FILE`)."""
+def read_head(db: Db, user: Annotated[Identity, require(Action.READ_AUDIT)]) -> schemas.AuditHead:
+    """Number and hash of the newest row, to be stored outside the server (`sagittal check --head FILE`)."""
     with db.read() as c:
         newest = read_newest(c)
     if newest is None:
@@ -31,13 +31,13 @@ def read_head(db: Db, who: Annotated[Identity, require(Action.READ_AUDIT)]) -> s
 @router.get("", response_model=list[schemas.AuditRow])
 def list_audit(
     db: Db,
-    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    user: Annotated[Identity, require(Action.READ_AUDIT)],
     before: Annotated[int | None, Query(ge=1, le=2**53, description="rows older than this number")] = None,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[schemas.AuditRow]:
-    """The newest rows first."""
+    """List audit rows, newest first."""
     with db.read() as c:
         return [
             schemas.make_answer(schemas.AuditRow, row)
-            for row in audit.list_entries(c, before=before, limit=limit)
+            for row in audit.list_entries(c, before_seq=before, limit=limit)
         ]

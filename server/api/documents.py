@@ -1,4 +1,4 @@
-"""The OpenAPI document: every refusal of every operation is in it, as problem+json."""
+"""The OpenAPI document, including all error responses of every operation as problem+json."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _PROBLEM = {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/ProblemDetails
 
 
 def openapi(app: FastAPI) -> dict[str, Any]:
-    """Return the OpenAPI document of the application, made once."""
+    """Return the cached OpenAPI document of the application."""
     if app.openapi_schema is None:
         app.openapi_schema = _complete(
             get_openapi(
@@ -39,7 +39,7 @@ def openapi(app: FastAPI) -> dict[str, Any]:
 
 
 def refusals(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Declare what an operation may answer beside the refusals that all share."""
+    """Declare error responses of an operation in addition to the common ones."""
     return {status: {"description": _WORDS[str(status)]} for status in statuses}
 
 

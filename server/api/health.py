@@ -1,4 +1,4 @@
-"""Whether the process lives, and whether it can do its work."""
+"""Liveness and readiness of the server."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DOOR = [require(Action.CHECK_HEALTH)]
 
 @router.get("/live", dependencies=_DOOR, response_model=schemas.HealthAnswer, openapi_extra=PUBLIC)
 def live() -> schemas.HealthAnswer:
-    """Answer, which is all that is asked."""
+    """Respond if the process is alive."""
     return schemas.HealthAnswer(status="ok")
 
 
@@ -30,7 +30,7 @@ def live() -> schemas.HealthAnswer:
     openapi_extra=PUBLIC,
 )
 def ready(request: Request, response: Response) -> schemas.HealthAnswer:
-    """Check that database and folder can be written, the schema is ours, there is room, processes live."""
+    """Check that database and folder are writable, the schema is current, space is left and processes run."""
     checks = dict(state_of(request).readiness.checks())
     healthy = all(state == "ok" for state in checks.values())
     response.status_code = 200 if healthy else 503

@@ -1,4 +1,4 @@
-"""Figures of the server, for Prometheus: administrators, or a token with the scope `metrics`."""
+"""Prometheus metrics, for administrators or tokens with the scope `metrics`."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ router = APIRouter(include_in_schema=False)
 
 @router.get("/metrics", dependencies=[require(Action.READ_SYSTEM)])
 def read_metrics(request: Request) -> Response:
-    """Everything in the text format of Prometheus."""
+    """All metrics in the Prometheus text format."""
     return Response(state_of(request).metrics.render(), media_type=CONTENT_TYPE_LATEST)

@@ -1,4 +1,4 @@
-"""All routes of the API, and those beside it that serve no page."""
+"""All routes of the API, including those outside /api/v1 that serve no page."""
 
 from __future__ import annotations
 
@@ -47,15 +47,15 @@ BESIDE: tuple[APIRouter, ...] = (sign_in.address_router, health.router, metrics.
 
 
 class ApiRouter(APIRouter):
-    """Routes of an API, none of which is looked at for an address that is not below its prefix."""
+    """Router that skips all its routes for paths outside its prefix."""
 
     def matches(self, scope: Scope) -> tuple[Match, Scope]:
-        """Find the route of a request."""
+        """Match a request to a route."""
         return super().matches(scope) if f"{self.prefix}/" in scope["path"] else (Match.NONE, {})
 
 
 def build_api() -> APIRouter:
-    """Return everything under /api/v1, with the document that describes it."""
+    """Return everything under /api/v1, including the OpenAPI document."""
     api = ApiRouter(prefix="/api/v1")
     for part in (
         sign_in,
@@ -99,7 +99,7 @@ def build_api() -> APIRouter:
     api.include_router(filter_runs.references)
 
     @api.get("/openapi.json", include_in_schema=False)
-    def document(request: Request, who: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
+    def document(request: Request, user: Annotated[Identity, require(Action.READ_API)]) -> dict[str, Any]:
         """Describe this API as OpenAPI."""
         return openapi(request.app)
 

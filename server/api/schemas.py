@@ -1,4 +1,4 @@
-"""What goes over the wire: requests of /api/v1, checked, and answers that are no record of a service."""
+"""Schemas of /api/v1: validated requests, and responses that differ from service records."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _JOINERS = "\u200c\u200d"
 
 
 def _one_line(refused: str) -> str:
-    """The pattern of a text that starts and ends with something visible, without control characters."""
+    """Pattern of a single line that starts and ends with a visible character, without control characters."""
     # up to 9f, as U+0085 is a space here and none in JSON Schema
     no = f"\\x00-\\x1f\\x7f-\\x9f{refused}"
     return f"^[^\\s{no}]([^{no}]*[^\\s{no}])?$"
@@ -57,31 +57,31 @@ Json = dict[str, Any]
 
 
 class Request(BaseModel):
-    """A body we receive: unknown members are refused, so a misspelt one is not silently ignored."""
+    """A request body; unknown fields are rejected, so that misspelt ones are not ignored."""
 
     model_config = ConfigDict(extra="forbid")
 
     def values(self) -> dict[str, Any]:
-        """Return the members that were sent; an empty note is stored as text."""
+        """Return the fields that were sent; an empty note is stored as text."""
         sent = self.model_dump(exclude_unset=True)
         return sent | ({"note": ""} if "note" in sent and sent["note"] is None else {})
 
 
-def make_answer(kind: type[Answer], source: object, **others: object) -> Answer:
-    """Build an answer from a row or a result.
+def make_answer(kind: type[Answer], source: object, **overrides: object) -> Answer:
+    """Build a response from a row or a result.
 
     Parameters
     ----------
-    kind : a dataclass. source : what has members of the same names; what `kind` does not name stays inside.
-    others : members that `source` has not, or in another form.
+    kind : a dataclass. source : object with attributes of the same names; others are omitted.
+    overrides : fields that `source` lacks or that need conversion.
     """
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # any dataclass
-    return kind(**{name: others[name] if name in others else getattr(source, name) for name in names})
+    return kind(**{name: overrides[name] if name in overrides else getattr(source, name) for name in names})
 
 
 @dataclass(frozen=True)
 class FieldProblem:
-    """One field that is not as expected."""
+    """An invalid field."""
 
     field: str
     message: str
@@ -89,7 +89,7 @@ class FieldProblem:
 
 @dataclass(frozen=True)
 class ProblemDetails:
-    """RFC 9457; `code` is stable, `detail` is a sentence that says what to do."""
+    """RFC 9457; `code` is stable, `detail` is a sentence with the remedy."""
 
     type: str
     title: str
@@ -100,7 +100,7 @@ class ProblemDetails:
 
 
 class ConsentNew(Request):
-    """What a patient agreed to, when, and where that is written."""
+    """A patient's consent: purpose, date and reference to the document."""
 
     purpose: Literal["recording", "research", "teaching", "sharing"]
     evidence: Line
@@ -115,7 +115,7 @@ class CareTeams:
 
 
 class CareTeamsSwitch(Request):
-    """On or off; `begin_with_past` = whoever has opened or changed something of a patient is in the team."""
+    """On or off; `begin_with_past` = users with earlier access to a patient join the team."""
 
     on: bool
     begin_with_past: bool = False
@@ -123,27 +123,27 @@ class CareTeamsSwitch(Request):
 
 @dataclass(frozen=True)
 class CareTeam:
-    """Who is in the team of a patient, and who opened the patient in an emergency."""
+    """Care team of a patient, and emergency access to the patient."""
 
     members: list[TeamMember]
     emergencies: list[EmergencyAccess]
 
 
 class CareTeamChange(Request):
-    """Who is in the team, by ids of accounts."""
+    """Members of the team, by account id."""
 
     users: Annotated[list[HexId], Field(max_length=1000)]
 
 
 class EmergencyOpening(Request):
-    """The exact code of a patient, and why somebody outside the team must open the patient."""
+    """The exact code of a patient, and the reason for emergency access from outside the team."""
 
     code: Code
     reason: Annotated[str, StringConstraints(min_length=REASON[0], max_length=REASON[1], pattern=_TEXT)]
 
 
 class IdentityChange(Request):
-    """Who a patient is; null takes a value away, what is left out stays as it is."""
+    """Changes to a patient's identity; null clears a value, omitted fields are unchanged."""
 
     name: Annotated[Line, Field(max_length=MOST["name"])] | None = None
     born_on: dt.date | None = None
@@ -153,7 +153,7 @@ class IdentityChange(Request):
 
 
 class PatientNew(Request):
-    """A new patient, under the clinic's own pseudonym."""
+    """A new patient with the clinic's own pseudonym."""
 
     code: Code
     sex: Sex | None = None
@@ -165,13 +165,13 @@ class PatientNew(Request):
 
 
 class PatientChange(PatientNew):
-    """What to change of a patient; members left out stay as they are."""
+    """Changes to a patient; omitted fields are unchanged."""
 
     code: Code = ""
 
 
 class Assessment(Request):
-    """The therapist's text on a report; empty or null = none."""
+    """The therapist's assessment on a report; empty or null = none."""
 
     content: Annotated[
         Note, Field(description=f"at most {signed_reports.ASSESSMENT_CHARACTERS} characters, trimmed")
@@ -179,26 +179,26 @@ class Assessment(Request):
 
 
 class Reopening(Request):
-    """Why a signed report is taken out of force."""
+    """Reason for reopening a signed report."""
 
     reason: SomeText
 
 
 class ReportLinkNew(Request):
-    """How long somebody may read a report by a link."""
+    """Lifetime of a link to a report."""
 
     days: Annotated[int, Field(ge=1, le=report_links.MOST_DAYS)] = report_links.USUAL_DAYS
 
 
 class NoteNew(Request):
-    """A note about a patient, of today unless said otherwise."""
+    """A note about a patient, dated today by default."""
 
     content: SomeText
     written_on: dt.date = dt.date.min
 
 
 class SessionNew(Request):
-    """A new visit, today unless said otherwise; of how it was walked null = not stated."""
+    """A new visit, today by default; null walking conditions = not recorded."""
 
     title: Line = ""
     performed_on: dt.date = dt.date.min
@@ -213,38 +213,38 @@ class SessionNew(Request):
 
 
 class SessionChange(SessionNew):
-    """What to change of a session; members left out stay as they are."""
+    """Changes to a session; omitted fields are unchanged."""
 
 
 class PlannedSessionNew(SessionNew):
-    """A new visit, perhaps one that was planned in a programme."""
+    """A new visit, optionally one that was planned in a programme."""
 
     planned_visit_id: HexId | None = None
 
 
 class ProgrammeNew(Request):
-    """A programme for a patient; `starts_on` is the day of the first training."""
+    """A programme for a patient; `starts_on` is the date of the first training."""
 
     starts_on: dt.date
     template: Literal["six_weeks"] = "six_weeks"
 
 
 class PlannedVisitChange(Request):
-    """Another day of a planned visit, or the session that it was (null: it was none)."""
+    """New date of a planned visit, or its session (null: none)."""
 
     planned_on: dt.date = dt.date.min
     session_id: HexId | None = None
 
 
 class VideoAlignment(Request):
-    """Time in the video at the take's time 0, in seconds; null takes the alignment back."""
+    """Video time at trial time 0, in seconds; null removes the alignment."""
 
     offset_s: Annotated[float, Field(allow_inf_nan=False)] | None
 
 
 @dataclass(frozen=True)
 class RecordingAnswer:
-    """The upload set of a session; `inspection` is what was found in it, before any mapping."""
+    """Upload set of a session; `inspection` holds the inspection results before any mapping."""
 
     id: str
     session_id: str
@@ -256,14 +256,14 @@ class RecordingAnswer:
 
 
 class AnalysisNew(Request):
-    """What to analyse with: a manifest (else the stored one), and settings that differ from the defaults."""
+    """Manifest (default: the stored one) and non-default settings of an analysis."""
 
     manifest: Json | None = None
     config: Json | None = None
 
 
 class TuningNew(Request):
-    """Which filter to tune, and the trials that only judge; it is fitted to the session's others."""
+    """Filter to tune and validation trials; it is fitted to the session's other trials."""
 
     algorithm: Line
     validation: Annotated[
@@ -280,7 +280,7 @@ class TuningNew(Request):
 
 @dataclass(frozen=True)
 class AnalysisAnswer:
-    """A finished analysis; its input, settings and code version give the same numbers again."""
+    """A finished analysis; it is reproducible from its input, settings and code version."""
 
     id: str
     recording_id: str
@@ -297,7 +297,7 @@ class AnalysisAnswer:
 
 @dataclass(frozen=True)
 class ReportAnswer:
-    """Everything the pages of a session show, in degrees and words; undefined is null with a reason."""
+    """Everything shown on the pages of a session, in degrees and words; undefined is null with a reason."""
 
     problem: str | None
     quality: dict[str, Any]
@@ -324,7 +324,7 @@ class ReportAnswer:
 
 @dataclass(frozen=True)
 class ParameterBehind:
-    """A parameter as in the table, its definition, and every stride of the list with its own figure."""
+    """A parameter as in the table, its definition, and the value of every stride."""
 
     parameter: dict[str, Any]
     definition: str
@@ -333,7 +333,7 @@ class ParameterBehind:
 
 @dataclass(frozen=True)
 class AuditRow:
-    """Who opened or changed what, when; each row's hash covers the row before it."""
+    """User, action and time of an access or change; each row's hash covers the previous row."""
 
     seq: int
     at: dt.datetime
@@ -348,7 +348,7 @@ class AuditRow:
 
 @dataclass(frozen=True)
 class AuditHead:
-    """The newest row of the audit log: its number and its hash."""
+    """Number and hash of the newest row of the audit log."""
 
     seq: int
     hash: str
@@ -356,7 +356,7 @@ class AuditHead:
 
 @dataclass(frozen=True)
 class HealthAnswer:
-    """State of the process, or of one of its parts."""
+    """State of the process or one of its components."""
 
     status: Literal["ok", "failing"]
     checks: dict[str, str] = field(default_factory=dict)

@@ -1,1 +1,1 @@
-"""Who is asking, from where, and what that person may do."""
+"""Authentication and authorization: identity, network origin and permissions of each request."""

@@ -1,4 +1,4 @@
-"""The door of every route: a dependency that declares the route's action and lets in only who may do it."""
+"""Access control for routes: a dependency that declares the action of a route and enforces its permission."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from sagittal.server.trail import AuditTrail
 
 
 class RouteAccess:
-    """Dependency of one route; `action` is what the walk over all routes reads."""
+    """Dependency of one route; `action` is read by the check over all routes."""
 
     def __init__(self, action: Action) -> None:
         self.action = action
 
     def __call__(self, connection: HTTPConnection) -> Identity | None:
-        """Return who is asking; raise Problem 401 without a sign-in, 403 without the right.
+        """Return the identity of the caller; raise Problem 401 if not signed in, 403 if not permitted.
 
-        404 where the clinic has care teams and the address names something of a patient of others.
+        Raises 404 if the clinic has care teams and the path refers to a patient outside the caller's teams.
         """
         counts = self.action is not Action.WATCH_SIGN_IN
         identity = identify(connection, connection.path_params, counts=counts)
@@ -47,27 +47,29 @@ class RouteAccess:
         return identity
 
 
-def _note_try(connection: HTTPConnection, who: Identity) -> None:
-    """Write down whom somebody outside the care team tried to open; the answer is that of an unknown id."""
+def _note_try(connection: HTTPConnection, user: Identity) -> None:
+    """Record an attempt to open a patient outside the care team; the response is as for an unknown id."""
     db: Database = connection.app.state.db
     trail: AuditTrail = connection.app.state.trail
     with db.read() as c:
-        hidden = list_hidden(c, who.user_id, connection.path_params)
+        hidden = list_hidden(c, user.user_id, connection.path_params)
     for patient_id in hidden:
-        trail.record_tried(who, "patient.hidden", "patient", patient_id)
+        trail.record_tried(user, "patient.hidden", "patient", patient_id)
 
 
 def require(action: Action) -> Any:
-    """Declare a route's action: `who: Annotated[Identity, require(Action.UPLOAD)]`, http or websocket."""
+    """Declare a route's action: `user: Annotated[Identity, require(Action.UPLOAD)]`, for HTTP or
+    websocket.
+    """
     return Depends(RouteAccess(action))
 
 
 def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bool = True) -> Identity | None:
-    """Return who asks on this connection for what parts of an address name, None when nobody is known.
+    """Return the identity on this connection with its access to the path parameters; None if anonymous.
 
     Parameters
     ----------
-    counts : it is activity.
+    counts : whether the request counts as activity and prolongs the sign-in.
     """
     bearer = read_bearer(connection)
     if bearer is not None:
@@ -79,38 +81,38 @@ def identify(connection: HTTPConnection, parts: Mapping[str, str], *, counts: bo
     return logins.find(token, parts) if counts else logins.look(token, parts)
 
 
-def opens(connection: HTTPConnection, who: Identity, parts: Mapping[str, str]) -> bool:
-    """Whether a person may open what parts of an address name (server/auth/sight.py)."""
+def opens(connection: HTTPConnection, user: Identity, parts: Mapping[str, str]) -> bool:
+    """Whether the user may open the resources given by path parameters (server/auth/sight.py)."""
     db: Database = connection.app.state.db
     with db.read() as c:
-        return may_open(c, who, parts)
+        return may_open(c, user, parts)
 
 
 def find_end(connection: HTTPConnection, **parts: str) -> str | None:
-    """Why what stays open must end: not_signed_in, or not_found where a patient may be opened no longer.
+    """Reason why a long-lived connection must close: `not_signed_in`, or `not_found` if access was withdrawn.
 
-    None while the sign-in goes on and still opens this; asking counts as no activity. Without `parts`: what
-    the address of the connection names.
+    Returns None while the sign-in is valid and still grants access; the check does not count as activity.
+    `parts` default to the path parameters of the connection.
     """
-    who = identify(connection, parts or connection.path_params, counts=False)
-    if who is None:
+    user = identify(connection, parts or connection.path_params, counts=False)
+    if user is None:
         return "not_signed_in"
-    return None if who.opens else "not_found"
+    return None if user.opens else "not_found"
 
 
 async def wait_for_end(find: Callable[[], str | None]) -> str:
-    """Return why what stays open must end, when it must.
+    """Wait until a long-lived connection must close and return the reason.
 
     Parameters
     ----------
-    find : asked in a thread every `CHECK_EVERY_S`, as `find_end`; asked again while the database is away, for
-        nobody can be put out then.
+    find : such as `find_end`, called in a thread every `CHECK_EVERY_S`. Database errors are ignored and the
+        check is repeated.
     """
     while True:
         await asyncio.sleep(CHECK_EVERY_S)
         try:
-            why = await asyncio.to_thread(find)
+            reason = await asyncio.to_thread(find)
         except SQLAlchemyError:
             continue
-        if why is not None:
-            return why
+        if reason is not None:
+            return reason

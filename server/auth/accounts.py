@@ -1,4 +1,4 @@
-"""The accounts of the clinic: who may sign in, and as what."""
+"""User accounts of the clinic and their roles."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sagittal.server.trail import AuditTrail
 
 
 def create(c: Connection, name: str, display_name: str | None, role: Role, password_hash: str) -> Row[Any]:
-    """Add an account and return its row; raise Problem 409 when the name is taken."""
+    """Add an account and return its row; raise Problem 409 if the name is taken."""
     values = {
         "id": new_id(),
         "name": name,
@@ -41,7 +41,7 @@ def create(c: Connection, name: str, display_name: str | None, role: Role, passw
 
 
 def get(c: Connection, user_id: str) -> Row[Any]:
-    """Return one account; raise Problem 404 when there is none."""
+    """Return one account; raise Problem 404 if it does not exist."""
     row = c.execute(select(user).where(user.c.id == user_id)).one_or_none()
     if row is None:
         raise Problem(404, "user_not_found", "There is no such account.")
@@ -49,12 +49,12 @@ def get(c: Connection, user_id: str) -> Row[Any]:
 
 
 def list_accounts(c: Connection) -> list[Row[Any]]:
-    """Return all accounts in order of their names."""
+    """Return all accounts, ordered by name."""
     return list(c.execute(select(user).order_by(user.c.name)).all())
 
 
 def change(c: Connection, user_id: str, values: dict[str, object]) -> Row[Any]:
-    """Change an account and return it; raise Problem 409 when nobody could administer the clinic any more."""
+    """Update an account and return it; raise Problem 409 if no active administrator would remain."""
     get(c, user_id)
     if values:
         c.execute(update(user).where(user.c.id == user_id).values(values))
@@ -78,13 +78,13 @@ def check_password(
     *,
     status: int = 401,
 ) -> Row[Any]:
-    """Return the account that this name and password open; a failure is in the audit log.
+    """Return the account for a user name and password; failures are recorded in the audit log.
 
     Raises
     ------
     Problem
-        429 after too many failures, else `status` with the same words for an unknown name, a wrong password
-        and a closed account.
+        429 after too many failures, otherwise `status`, with the same message for an unknown name, a wrong
+        password and a closed account.
     """
     name = name.strip().lower()
     begun = throttle.begin(name, address)
@@ -105,7 +105,7 @@ def check_password(
 
 
 class Factor(StrEnum):
-    """By what somebody signed in, beside the password: nothing, or what was taken as second factor."""
+    """Authentication factor used in addition to the password, if any."""
 
     PASSWORD = "password"  # noqa: S105 - the name of a factor
     CODE = "code"
@@ -123,16 +123,16 @@ def check_code(
     key: tuple[Site, Mapping[str, Any]] | None,
     address: str,
 ) -> Factor:
-    """After the password: require a code, or the answer of a security key, where there is a second factor.
+    """Verify the second factor after the password, if the account has one: a code or a security key.
 
     Returns
     -------
-    What was taken.
+    The factor that was used.
 
     Raises
     ------
     CodeNeeded, CodeWrong
-        401 without one or with a wrong one. Problem 429 after too many wrong ones.
+        401 if the code is missing or wrong. Problem 429 after too many failures.
     """
     with db.read() as c:
         if not second_factor.is_on(c, user_id):
@@ -149,18 +149,18 @@ def check_code(
         raise second_factor.CodeNeeded
     with count_wrong_codes(throttle, user_id):
         with db.write() as c:
-            before = second_factor.count_recovery(c, user_id)
+            remaining_before = second_factor.count_recovery(c, user_id)
             is_right = second_factor.use(c, key_file, user_id, code or "")
-            after = second_factor.count_recovery(c, user_id)
+            remaining_after = second_factor.count_recovery(c, user_id)
         if not is_right:
             trail.record_refused("sign_in.failed", "user", user_id, address)
             raise second_factor.CodeWrong(401)
-    return Factor.RECOVERY_CODE if after < before else Factor.CODE
+    return Factor.RECOVERY_CODE if remaining_after < remaining_before else Factor.CODE
 
 
 @contextlib.contextmanager
 def count_wrong_codes(throttle: Throttle, user_id: str) -> Iterator[None]:
-    """Count a wrong code of an account, from wherever it comes; ten in a quarter of an hour."""
+    """Count a failed code of an account from any address; ten are allowed per quarter of an hour."""
     key = f"code of {user_id}"
     begun = throttle.begin(key, key)
     try:

@@ -1,10 +1,10 @@
-"""Tokens with which programs use the API in a person's name: a part of that person's rights, for a time.
+"""API tokens: programs act for a user with a subset of that user's permissions until the token expires.
 
     Authorization: Bearer sgt_…
 
-The token is shown once, the database has its hash. It is taken from that header of /api/v1 and /metrics
-alone: never from an address, a cookie or a websocket. It ends when its time is over, when it is revoked, and
-while the account is closed; a role that may less takes from it too.
+The token is shown once; the database stores its hash. It is accepted only in this header and only on /api/v1
+and /metrics, never in a URL, a cookie or a websocket. It becomes invalid when it expires, is revoked or its
+account is closed; restricting the user's role restricts the token too.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _DOORS: Final = ("/api/v1/", "/metrics")
 
 
 class Scope(StrEnum):
-    """What a token may be made for."""
+    """Permission that a token may be issued for."""
 
     READ = "read"
     UPLOAD = "upload"
@@ -78,47 +78,49 @@ SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
 def issue(
     c: Connection, user_id: str, name: str, scopes: Collection[Scope], days: int
 ) -> tuple[Row[Any], str]:
-    """Make a token; returns its row and, for this once, the token itself. Raises Problem 409 beyond 50."""
+    """Issue a token; return its row and the token, which is not stored. Raises Problem 409 for more
+    than 50.
+    """
     if len(list_tokens(c, user_id)) >= MOST_TOKENS:
         raise Problem(
             409,
             "too_many_tokens",
             f"An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
         )
-    token, at = PREFIX + new_token(), now()
+    token, issued_at = PREFIX + new_token(), now()
     values = {
         "id": new_id(),
         "user_id": user_id,
         "name": name,
         "token_sha256": token_hash(token),
         "scopes": sorted(scopes),
-        "created_at": at,
-        "expires_at": at + dt.timedelta(days=days),
+        "created_at": issued_at,
+        "expires_at": issued_at + dt.timedelta(days=days),
     }
     c.execute(insert(api_token).values(values))
     return c.execute(select(api_token).where(api_token.c.id == values["id"])).one(), token
 
 
 def list_tokens(c: Connection, user_id: str) -> Sequence[Row[Any]]:
-    """A person's tokens, those that are over too, the newest first."""
+    """Tokens of a user including expired ones, newest first."""
     mine = select(api_token).where(api_token.c.user_id == user_id)
     return c.execute(mine.order_by(api_token.c.created_at.desc(), api_token.c.id)).all()
 
 
 def revoke(c: Connection, user_id: str, token_id: str) -> None:
-    """End one token of a person; raises Problem 404."""
+    """Revoke one token of a user; raises Problem 404."""
     gone = c.execute(delete(api_token).where(api_token.c.id == token_id, api_token.c.user_id == user_id))
     if not gone.rowcount:
         raise Problem(404, "token_not_found", "There is no such token; it may have been revoked already.")
 
 
 def revoke_all(c: Connection, user_id: str) -> None:
-    """End every token of a person."""
+    """Revoke all tokens of a user."""
     c.execute(delete(api_token).where(api_token.c.user_id == user_id))
 
 
 def read_bearer(connection: HTTPConnection) -> str | None:
-    """The token of this request, None when it has none or comes by a door that takes none."""
+    """Bearer token of this request, None if absent or not accepted on this route."""
     scheme, _, token = connection.headers.get("authorization", "").partition(" ")
     if scheme.lower() != "bearer" or connection.scope["type"] != "http":
         return None
@@ -126,8 +128,8 @@ def read_bearer(connection: HTTPConnection) -> str | None:
 
 
 def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-    """Who asks with this token; None when it is unknown, over or revoked, or its account is closed."""
-    at = now()
+    """Identity for a token; None if it is unknown, expired or revoked, or its account is closed."""
+    time = now()
     query = (
         select(
             user,
@@ -137,14 +139,14 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
             opens_parts(parts).label("opens"),
         )
         .join(api_token, api_token.c.user_id == user.c.id)
-        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > at, user.c.active)
+        .where(api_token.c.token_sha256 == token_hash(token), api_token.c.expires_at > time, user.c.active)
     )
-    found = db.ask(query)
-    if not found:
+    rows = db.ask(query)
+    if not rows:
         return None
-    [row] = found
-    if row.used_at is None or row.used_at <= at - _TOUCH_EVERY:
-        _write_used(db, row.token_id, at)
+    [row] = rows
+    if row.used_at is None or row.used_at <= time - _TOUCH_EVERY:
+        _write_used(db, row.token_id, time)
     allowed = frozenset[Action]().union(*(SCOPES[Scope(scope)] for scope in row.scopes))
     login_id = f"token:{row.token_id}"
     return Identity(
@@ -152,10 +154,10 @@ def find_bearer(db: Database, token: str, parts: Mapping[str, str] = NOTHING) ->
     )
 
 
-def _write_used(db: Database, token_id: str, at: dt.datetime) -> None:
+def _write_used(db: Database, token_id: str, time: dt.datetime) -> None:
     try:
         with db.write() as c:
-            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=at))
+            c.execute(update(api_token).where(api_token.c.id == token_id).values(used_at=time))
     except OperationalError as error:
         if refusal_of(error) is None:
             raise

@@ -1,4 +1,4 @@
-"""The session cookie: `__Host-sid` behind TLS, plain `sid` on loopback http (no Secure there)."""
+"""Session cookie: `__Host-sid` over TLS, plain `sid` for HTTP on loopback (`Secure` is unavailable there)."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ LOOPBACK_NAME = "sid"
 
 
 def read_token(connection: HTTPConnection) -> str | None:
-    """Return the session token, only from the cookie name that this installation gives out."""
+    """Return the session token, read only from the cookie name that this installation sets."""
     return connection.cookies.get(_name(connection)) or None
 
 
 def set_token(response: Response, connection: HTTPConnection, token: str) -> None:
-    """Give the browser its token for as long as the browser runs; the server decides when it ends."""
+    """Set the token as a browser-session cookie; its lifetime is controlled by the server."""
     response.set_cookie(
         _name(connection), token, path="/", secure=_is_secure(connection), httponly=True, samesite="lax"
     )
 
 
 def clear_token(response: Response, connection: HTTPConnection) -> None:
-    """Take the token back from the browser."""
+    """Delete the session cookie in the browser."""
     response.delete_cookie(
         _name(connection), path="/", secure=_is_secure(connection), httponly=True, samesite="lax"
     )

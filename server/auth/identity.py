@@ -1,4 +1,4 @@
-"""A signed-in person, as one request knows him or her."""
+"""Identity of the signed-in user for one request."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from sagittal.server.auth.roles import Action, Role, is_permitted
 
 @dataclass(frozen=True)
 class Identity:
-    """Who is asking.
+    """Signed-in user of a request.
 
     Parameters
     ----------
-    user_id, name, display_name, role : the account. language : of the pages, None = the browser's.
-    login_id : which sign-in this is (two browsers of one person are two); the hash of its token.
-    allowed : the actions of the API token that asks, None = a person at a browser.
-    opens : whether this person may open what the address of the request names (server/auth/sight.py).
+    user_id, name, display_name, role : the account. language : of the pages, None = as set in the browser.
+    login_id : the sign-in (each browser has its own), identified by the hash of its token.
+    allowed : actions permitted to the API token of the request, None = a browser session.
+    opens : whether the user may open the resources in the request path (server/auth/sight.py).
     """
 
     user_id: str
@@ -30,14 +30,14 @@ class Identity:
 
     @property
     def token_id(self) -> str | None:
-        """The API token that asks, None = a person at a browser."""
+        """Id of the API token, None for a browser session."""
         return None if self.allowed is None else self.login_id.removeprefix("token:")
 
     @property
     def is_admin(self) -> bool:
-        """Whether this person runs the clinic's accounts and care teams, and so sees every patient."""
+        """Whether the user administers accounts and care teams, and therefore sees every patient."""
         return self.role is Role.ADMIN
 
     def may(self, action: Action) -> bool:
-        """Tell whether this person's role allows the action; pages ask it what to offer."""
+        """Whether the user's role permits the action; pages use it to choose which controls to show."""
         return is_permitted(self.role, action) and (self.allowed is None or action in self.allowed)

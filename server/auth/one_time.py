@@ -1,4 +1,4 @@
-"""One-time addresses: `/set-up/{token}` makes the first administrator, `/sign-in/{token}` opens the demo."""
+"""One-time links: `/set-up/{token}` creates the first administrator, `/sign-in/{token}` opens the demo."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LIFE = dt.timedelta(hours=24)
 
 
 class LinkNotValid(Problem):
-    """The address cannot be used, for whatever reason."""
+    """The link is invalid, for any reason."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -27,12 +27,12 @@ class LinkNotValid(Problem):
 
 
 def needs_set_up(c: Connection) -> bool:
-    """Tell whether nobody can sign in yet."""
+    """Whether no account exists yet."""
     return not c.execute(select(func.count()).select_from(user)).scalar_one()
 
 
 def issue_set_up(c: Connection, shared_key: bytes = b"") -> str:
-    """Return the token of the first administrator's set-up address; there is one at a time.
+    """Return the token of the set-up link for the first administrator; only the latest is valid.
 
     Parameters
     ----------
@@ -53,17 +53,17 @@ def issue_set_up(c: Connection, shared_key: bytes = b"") -> str:
 
 
 def issue_sign_in(c: Connection, user_id: str) -> str:
-    """Return a token whose address signs this person in once."""
+    """Return a token whose link signs this user in once."""
     return _store(c, new_token(), "sign_in", user_id, now() + LIFE)
 
 
 def is_valid(c: Connection, token: str, purpose: str) -> bool:
-    """Tell whether the address may still be used, without using it."""
+    """Whether the link is still valid; does not consume it."""
     return _find(c, token, purpose) is not None
 
 
 def use(c: Connection, token: str, purpose: str) -> str | None:
-    """Use the token up and return its user id (None for set-up); raise NotValid when it cannot be used."""
+    """Consume the token and return its user id (None for set-up); raise LinkNotValid if it is invalid."""
     row = _find(c, token, purpose)
     # one answer for unknown, used and expired: nothing to learn by guessing
     if row is None:
@@ -83,7 +83,7 @@ def _store(c: Connection, token: str, purpose: str, user_id: str | None, expires
 
 
 def _derive(shared_key: bytes, expires_at: dt.datetime) -> str:
-    """Return the token that every holder of the key computes for this expiry."""
+    """Return the token that every holder of the key derives for this expiry."""
     return hmac.new(shared_key, f"set-up {expires_at.isoformat()}".encode(), hashlib.sha256).hexdigest()
 
 

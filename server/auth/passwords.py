@@ -1,4 +1,4 @@
-"""Passwords: argon2id, at most two at a time, and the same cost whether or not the account exists."""
+"""Password hashing with argon2id: at most two at a time, in equal time whether or not the account exists."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PATIENCE_S = 5.0
 
 
 def hash_password(password: str) -> str:
-    """Return the argon2id hash of a new password; raise Problem when it is too short or too long."""
+    """Return the argon2id hash of a new password; raise Problem if it is too short or too long."""
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
         raise Problem(
             422,
@@ -38,7 +38,7 @@ def hash_password(password: str) -> str:
 
 
 def verify_password(password: str, stored: str | None) -> bool:
-    """Tell whether the password is right; None (no such account) takes as long as a wrong password."""
+    """Whether the password is correct; None (no such account) takes as long as a wrong password."""
     if len(password) > MAX_LENGTH:
         password = ""
     nobody = _nobody()
@@ -52,7 +52,7 @@ def verify_password(password: str, stored: str | None) -> bool:
 
 @functools.cache
 def _nobody() -> str:
-    """Return the hash that unknown names are checked against; made at the first sign-in, not at import."""
+    """Return the hash that unknown names are checked against, computed at the first sign-in."""
     with _slot():
         return _HASHER.hash("no account has this password")
 

@@ -1,4 +1,4 @@
-"""The one policy table: which role may do what; what is not in it is refused."""
+"""Permission table: actions allowed per role. An action without an entry is denied."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """What a person is in this clinic."""
+    """Role of a user in the clinic."""
 
     ADMIN = "admin"
     CLINICIAN = "clinician"
@@ -16,7 +16,7 @@ class Role(StrEnum):
 
 
 class Action(StrEnum):
-    """What a route does; every route declares exactly one."""
+    """Action performed by a route; every route declares exactly one."""
 
     SIGN_IN = "sign_in"
     SET_UP = "set_up"
@@ -118,5 +118,5 @@ POLICY: dict[Action, frozenset[Role]] = {
 
 
 def is_permitted(role: Role, action: Action) -> bool:
-    """Tell whether a signed-in person with this role may do this; an action without a row is refused."""
+    """Whether this role permits the action for a signed-in user; an action without an entry is denied."""
     return action in PUBLIC or role in POLICY.get(action, frozenset())

@@ -1,4 +1,4 @@
-"""Deny by default: an application with a route that declares no action does not start."""
+"""Deny by default: the application refuses to start if a route declares no action."""
 
 from __future__ import annotations
 
@@ -16,35 +16,37 @@ from sagittal.server.auth.sight import OF_NOBODY, OWNER
 
 
 class UndeclaredRouteError(RuntimeError):
-    """A route says not exactly one action, or not whose it is; name it with `require(Action.…)`."""
+    """A route does not declare exactly one action or the owner of a path parameter; use
+    `require(Action.…)`.
+    """
 
 
 def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
-    """Return each route's action by its methods and path, websockets and static mounts included.
+    """Return the action of each route by its methods and path, including websockets and static mounts.
 
     Raises
     ------
     UndeclaredRouteError
-        a route declares no action, or several; or a part of its address is of nobody known.
+        a route declares no action or several, or the owner of a path parameter is unknown.
     """
-    found: dict[str, Action] = {}
+    declared: dict[str, Action] = {}
     for path, route in _leaves(routes):
         actions = _actions(route)
         name = f"{_methods(route)} {path}"
         if len(actions) != 1:
-            said = ", ".join(sorted(actions)) or "none"
-            raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {said}.")
+            names = ", ".join(sorted(actions)) or "none"
+            raise UndeclaredRouteError(f"Route {name}: expected one declared action, found {names}.")
         unknown = set(re.findall(r"\{(\w+)", path)) - OWNER.keys() - OF_NOBODY
         if unknown:
             raise UndeclaredRouteError(
                 f"Route {name}: nothing says whose {', '.join(sorted(unknown))} is; see server/auth/sight.py."
             )
-        found[name] = actions.pop()
-    return found
+        declared[name] = actions.pop()
+    return declared
 
 
 def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:
-    """Yield every route with its whole path."""
+    """Yield every route with its full path."""
     # newer FastAPI keeps an included router as one entry and has this walk; older ones copy its routes
     contexts = getattr(fastapi.routing, "iter_route_contexts", None)
     if contexts is None:

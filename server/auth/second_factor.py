@@ -1,9 +1,9 @@
-"""A second factor beside the password: a code of six figures that changes every 30 s (TOTP, RFC 6238).
+"""Two-factor authentication: a six-digit code that changes every 30 s (TOTP, RFC 6238).
 
-The secret is stored encrypted; its key is a file beside the database, so that a copy of the database alone
-opens nothing. The first secret makes the key; beside secrets a missing key is an error. A code is taken once:
-the newest step that was taken is stored, and only later ones count. Recovery codes are stored as hashes
-and end when used.
+Secrets are stored encrypted. The key is a file next to the database, so a copy of the database alone is not
+enough to decrypt them. The key is created with the first secret; if secrets exist, a missing key is an error.
+Each code is accepted once: the time step of the newest accepted code is stored, and only later ones are
+valid. Recovery codes are stored as hashes and can be used once.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _GROUPS, _GROUP = 4, 4
 
 
 class CodeNeeded(Problem):
-    """The password is right, and the account has a second factor."""
+    """The password is correct, but the account requires a second factor."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -49,7 +49,7 @@ class CodeNeeded(Problem):
 
 
 class CodeWrong(Problem):
-    """The code is not the one of this moment, or was used already."""
+    """The code is incorrect, expired or already used."""
 
     def __init__(self, status: int) -> None:
         super().__init__(
@@ -60,7 +60,7 @@ class CodeWrong(Problem):
 
 
 class KeyOfFactorsUnusable(Problem):
-    """The key that opens the secrets is missing, or is another one."""
+    """The key that decrypts the secrets is missing or does not match."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -73,7 +73,7 @@ class KeyOfFactorsUnusable(Problem):
 
 @dataclass(frozen=True)
 class SecondFactorSetUp:
-    """What an authenticator needs, shown this once: the secret, its otpauth address, a picture of that."""
+    """Enrolment data for an authenticator, shown once: the secret, its otpauth URI and a QR code of that."""
 
     secret: str
     address: str
@@ -81,11 +81,11 @@ class SecondFactorSetUp:
 
 
 def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFactorSetUp:
-    """Make a secret, which counts from the first right code on.
+    """Create a secret, which takes effect after the first correct code.
 
     Raises
     ------
-    Problem 409 where one counts; KeyOfFactorsUnusable, of a key that is missing beside secrets too.
+    Problem 409 if a second factor is active; KeyOfFactorsUnusable, also if secrets exist without a key.
     """
     if is_on(c, user_id):
         raise Problem(409, "second_factor_on", "There is a second factor already. Remove it first.")
@@ -99,7 +99,7 @@ def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFacto
 
 
 def confirm(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> list[str]:
-    """Begin to ask for codes; returns the recovery codes, which are shown this once. Raises CodeWrong."""
+    """Activate the second factor; return the recovery codes, which are shown only once. Raises CodeWrong."""
     if is_on(c, user_id) or not _take_code(c, key_file, user_id, code, at_s):
         raise CodeWrong(403)
     codes = ["-".join(_random_group() for _ in range(_GROUPS)) for _ in range(RECOVERY_CODES)]
@@ -112,21 +112,21 @@ def confirm(c: Connection, key_file: Path, user_id: str, code: str, at_s: float 
 
 
 def is_on(c: Connection, user_id: str) -> bool:
-    """Whether this account needs a code."""
+    """Whether this account requires a second factor."""
     query = select(second_factor.c.confirmed_at).where(second_factor.c.user_id == user_id)
     return c.execute(query).scalar() is not None
 
 
 def list_users(c: Connection) -> set[str]:
-    """The accounts that need a code."""
+    """Ids of the accounts that require a second factor."""
     query = select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))
     return set(c.execute(query).scalars())
 
 
 def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | None = None) -> bool:
-    """Take a code of this moment or a recovery code, once; False when it is neither (writes).
+    """Consume a current code or a recovery code (writes); False if it is neither.
 
-    Of an account that takes security keys only, recovery codes alone.
+    Accounts that accept security keys only can use recovery codes but no codes of an authenticator.
     """
     if not takes_keys_only(c, user_id) and _take_code(c, key_file, user_id, code, at_s):
         return True
@@ -134,25 +134,27 @@ def use(c: Connection, key_file: Path, user_id: str, code: str, at_s: float | No
 
 
 def takes_keys_only(c: Connection, user_id: str) -> bool:
-    """Whether figures of the authenticator are not taken: a page that pretends could ask for them."""
+    """Whether codes of an authenticator are rejected for this account, as a phishing page could
+    request them.
+    """
     query = select(second_factor.c.keys_only).where(second_factor.c.user_id == user_id)
     return bool(c.execute(query).scalar())
 
 
 def take_keys_only(c: Connection, user_id: str, only: bool) -> None:
-    """Take security keys and recovery codes only, or the figures of the authenticator as well."""
+    """Switch between security keys and recovery codes only, and authenticator codes as well."""
     mine = second_factor.c.user_id == user_id
     c.execute(update(second_factor).where(mine).values(keys_only=only))
 
 
 def count_recovery(c: Connection, user_id: str) -> int:
-    """How many recovery codes have not been used."""
+    """Number of unused recovery codes."""
     query = select(second_factor.c.recovery).where(second_factor.c.user_id == user_id)
     return len(c.execute(query).scalar() or ())
 
 
 def remove(c: Connection, user_id: str) -> bool:
-    """Ask for no code and no security key any more; False when none was asked for."""
+    """Remove codes and security keys of an account; False if it has none."""
     for table in (security_key, security_key_challenge):
         c.execute(delete(table).where(table.c.user_id == user_id))
     return bool(c.execute(delete(second_factor).where(second_factor.c.user_id == user_id)).rowcount)
@@ -174,12 +176,12 @@ def _take_code(c: Connection, key_file: Path, user_id: str, code: str, at_s: flo
 
 
 def _take_recovery(c: Connection, user_id: str, code: str) -> bool:
-    found = token_hash(code.strip().upper())
+    digest = token_hash(code.strip().upper())
     mine = second_factor.c.user_id == user_id
     left = list(c.execute(select(second_factor.c.recovery).where(mine)).scalar() or ())
-    if found not in left:
+    if digest not in left:
         return False
-    left.remove(found)
+    left.remove(digest)
     c.execute(update(second_factor).where(mine).values(recovery=left))
     return True
 
@@ -189,7 +191,7 @@ def _random_group() -> str:
 
 
 def find_problems(c: Connection, key_file: Path) -> list[str]:
-    """Whose secret cannot be read by the key, one sentence each; one alone where the key is not usable."""
+    """One sentence for each user whose secret cannot be decrypted, or a single one if the key is unusable."""
     rows = c.execute(select(second_factor.c.user_id, second_factor.c.secret)).all()
     if not rows:
         return []
@@ -197,17 +199,17 @@ def find_problems(c: Connection, key_file: Path) -> list[str]:
         key = _read_key(key_file)
     except KeyOfFactorsUnusable as error:
         return [f"{key_file}: {error.detail}"]
-    found = []
+    problems = []
     for row in rows:
         try:
             _open(key, row.secret)
         except KeyOfFactorsUnusable:
-            found.append(f"the second factor of account {row.user_id} needs another key than {key_file}")
-    return found
+            problems.append(f"the second factor of account {row.user_id} needs another key than {key_file}")
+    return problems
 
 
 def _make_missing_key(c: Connection, path: Path) -> None:
-    """Make the key for the first secret; raises KeyOfFactorsUnusable where there are secrets already."""
+    """Create the key for the first secret; raises KeyOfFactorsUnusable if secrets exist already."""
     if path.exists():
         return
     if c.execute(select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))).first():

@@ -1,10 +1,10 @@
-"""Security keys beside the password (WebAuthn, W3C Level 2): registered, asked for at sign-in, removed.
+"""Security keys as a second factor (WebAuthn, W3C Level 2): registration, sign-in and removal.
 
-A key signs a challenge for the name of this host alone, and is taken only at the port where it was set up:
-a page that pretends to be this server, or another service on its host, gets nothing it can use. A challenge
-is random, of one account and one purpose, has five minutes and one use; the database has its hash. Keys stand
-beside the codes of server/auth/second_factor.py, which come first: whoever loses a key gets in by a recovery
-code.
+A key signs a challenge for the name of this host only, and is accepted only at the port where it was
+registered: a phishing page, or another service on the same host, obtains nothing it can use. A
+challenge is random, bound to one account and one purpose, valid for five minutes and one use; the
+database stores its hash. An account needs the codes of server/auth/second_factor.py before it can
+register a key, so that a user who loses a key can sign in with a recovery code.
 """
 
 from __future__ import annotations
@@ -42,32 +42,36 @@ Purpose = Literal["register", "sign_in"]
 
 @dataclass(frozen=True)
 class Site:
-    """Under what name the browser knows this server: host name, and origin with scheme and port."""
+    """Host name and origin (scheme, host, port) under which the browser reaches this server."""
 
     host: str
     origin: str
 
     @property
     def address(self) -> str:
-        """Host name and port. Browsers keep keys apart by the name alone; another port is another service."""
+        """Host name and port. Browsers distinguish keys by host name only; another port is another
+        service.
+        """
         return self.origin.partition("://")[2]
 
     @property
     def has_keys(self) -> bool:
-        """Whether browsers offer keys here: over HTTPS or on localhost, and for no address in figures."""
+        """Whether browsers support security keys here: over HTTPS or on localhost, and not for IP
+        addresses.
+        """
         is_figures = ":" in self.host or self.host.replace(".", "").isdigit()
         is_short = len(self.address) <= _LONGEST_ADDRESS
         return is_short and not is_figures and (self.origin.startswith("https:") or self.host == "localhost")
 
 
 def site_of(connection: HTTPConnection, *, behind_tls: bool) -> Site:
-    """The name by which a browser came; the hosts it may be are checked before (server/http/hosts.py)."""
+    """Site of a request; its host name has been checked against the allow-list (server/http/hosts.py)."""
     host = connection.headers.get("host", "").strip().lower()
     return Site(host_name(host), f"{'https' if behind_tls else 'http'}://{host}")
 
 
 class KeyRefused(Problem):
-    """What a key answered does not prove that it is one of this account."""
+    """The response of a key does not prove that it belongs to this account."""
 
     def __init__(self, status: int) -> None:
         super().__init__(
@@ -78,18 +82,20 @@ class KeyRefused(Problem):
 
 
 def list_keys(c: Connection, user_id: str) -> Sequence[Row[Any]]:
-    """The keys of an account, the oldest first."""
+    """Security keys of an account, oldest first."""
     mine = select(security_key).where(security_key.c.user_id == user_id)
     return c.execute(mine.order_by(security_key.c.created_at, security_key.c.id)).all()
 
 
 def list_usable(c: Connection, site: Site, user_id: str) -> Sequence[Row[Any]]:
-    """Of these, those that were set up at this address and sign in here."""
+    """Security keys of an account that were registered at this address."""
     return [key for key in list_keys(c, user_id) if site.has_keys and key.host == site.address]
 
 
 def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> dict[str, Any]:
-    """What the browser needs to set up a key; raises Problem 409 without a second factor, or beyond ten."""
+    """Options for registering a key; raises Problem 409 without a second factor, or for more than ten
+    keys.
+    """
     from webauthn import generate_registration_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor
 
@@ -105,8 +111,8 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
             "second_factor_off",
             "Set up the authenticator first: its recovery codes help when a key is lost.",
         )
-    known = list_keys(c, user_id)
-    if len(known) >= MOST_KEYS:
+    keys = list_keys(c, user_id)
+    if len(keys) >= MOST_KEYS:
         raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
     options = generate_registration_options(
         rp_id=site.host,
@@ -114,29 +120,29 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         user_name=name,
         user_id=bytes.fromhex(user_id),
         challenge=_new_challenge(c, user_id, "register"),
-        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        exclude_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
     )
     return _as_tree(options_to_json(options))
 
 
 def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mapping[str, Any]) -> bytes | None:
-    """The challenge that was answered, if it was given to this account for this and waits; it ends here."""
+    """Consume the challenge of a response; None if it was not issued to this account for this purpose."""
     from webauthn import base64url_to_bytes
 
     try:
-        said = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
-        challenge = base64url_to_bytes(str(said["challenge"]))
+        client_data = json.loads(base64url_to_bytes(str(answer["response"]["clientDataJSON"])))
+        challenge = base64url_to_bytes(str(client_data["challenge"]))
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
     table = security_key_challenge
-    given = (
+    expected = (
         table.c.challenge_sha256 == token_hash(challenge.hex()),
         table.c.user_id == user_id,
         table.c.purpose == purpose,
         table.c.expires_at > now(),
     )
     # of two that come at once one deletes the row
-    return challenge if c.execute(delete(table).where(*given)).rowcount else None
+    return challenge if c.execute(delete(table).where(*expected)).rowcount else None
 
 
 def register(
@@ -147,22 +153,22 @@ def register(
     answer: Mapping[str, Any],
     challenge: bytes | None,
 ) -> Row[Any]:
-    """Keep a key by what it answered to a challenge of `take_challenge`, whose end is written before.
+    """Store a key from its response to a challenge of `take_challenge`, which must be committed first.
 
-    Raises KeyRefused 403, Problem 409 beyond MOST_KEYS.
+    Raises KeyRefused 403, Problem 409 for more than MOST_KEYS.
     """
     from webauthn import verify_registration_response
 
     if challenge is None or not site.has_keys or not second_factor.is_on(c, user_id):
         raise KeyRefused(403)
     with _refusals(403):
-        made = verify_registration_response(
+        verified = verify_registration_response(
             credential=dict(answer),
             expected_challenge=challenge,
             expected_rp_id=site.host,
             expected_origin=site.origin,
         )
-    same = select(security_key.c.id).where(security_key.c.credential_id == made.credential_id)
+    same = select(security_key.c.id).where(security_key.c.credential_id == verified.credential_id)
     if c.execute(same).first() is not None:
         raise KeyRefused(403)
     if len(list_keys(c, user_id)) >= MOST_KEYS:
@@ -172,9 +178,9 @@ def register(
         "user_id": user_id,
         "name": name,
         "host": site.address,
-        "credential_id": made.credential_id,
-        "public_key": made.credential_public_key,
-        "sign_count": made.sign_count,
+        "credential_id": verified.credential_id,
+        "public_key": verified.credential_public_key,
+        "sign_count": verified.sign_count,
         "created_at": now(),
     }
     c.execute(insert(security_key).values(row))
@@ -182,17 +188,17 @@ def register(
 
 
 def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | None:
-    """What the browser needs to ask a key of this account for; None when it has none for this address."""
+    """Options for signing in with a key; None if the account has no key for this address."""
     from webauthn import generate_authentication_options, options_to_json
     from webauthn.helpers.structs import PublicKeyCredentialDescriptor, UserVerificationRequirement
 
-    known = list_usable(c, site, user_id)
-    if not known or not second_factor.is_on(c, user_id):
+    keys = list_usable(c, site, user_id)
+    if not keys or not second_factor.is_on(c, user_id):
         return None
     options = generate_authentication_options(
         rp_id=site.host,
         challenge=_new_challenge(c, user_id, "sign_in"),
-        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in known],
+        allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
         # the password is what one knows; the key is what one has
         user_verification=UserVerificationRequirement.DISCOURAGED,
     )
@@ -200,7 +206,7 @@ def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | N
 
 
 def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> bool:
-    """Take what a key of this account answered, once (writes)."""
+    """Verify the response of a security key, once (writes)."""
     from webauthn import base64url_to_bytes, verify_authentication_response
 
     challenge = take_challenge(c, user_id, "sign_in", answer)
@@ -232,7 +238,7 @@ def use(c: Connection, site: Site, user_id: str, answer: Mapping[str, Any]) -> b
 
 
 def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
-    """Forget one key of an account; with none left for here codes are taken again. Raises Problem 404."""
+    """Delete one key of an account; if none is left here, codes are accepted again. Raises Problem 404."""
     mine = (security_key.c.id == key_id, security_key.c.user_id == user_id)
     if not c.execute(delete(security_key).where(*mine)).rowcount:
         raise Problem(404, "key_not_found", "There is no such key; it may have been removed already.")
@@ -241,21 +247,21 @@ def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
 
 
 def _new_challenge(c: Connection, user_id: str, purpose: Purpose) -> bytes:
-    """Make a challenge and forget those that are over, or too many of this account."""
-    at, made = now(), secrets.token_bytes(32)
+    """Create a challenge and delete expired or surplus ones of this account."""
+    time, challenge = now(), secrets.token_bytes(32)
     table = security_key_challenge
-    c.execute(delete(table).where(table.c.expires_at <= at))
+    c.execute(delete(table).where(table.c.expires_at <= time))
     mine = select(table.c.challenge_sha256).where(table.c.user_id == user_id)
     waiting = c.execute(mine.order_by(table.c.expires_at.desc()).offset(_MOST_WAITING - 1)).scalars().all()
     c.execute(delete(table).where(table.c.challenge_sha256.in_(waiting)))
-    row = {"challenge_sha256": token_hash(made.hex()), "user_id": user_id, "purpose": purpose}
-    c.execute(insert(table).values(**row, expires_at=at + CHALLENGE_LIFE))
-    return made
+    row = {"challenge_sha256": token_hash(challenge.hex()), "user_id": user_id, "purpose": purpose}
+    c.execute(insert(table).values(**row, expires_at=time + CHALLENGE_LIFE))
+    return challenge
 
 
 @contextlib.contextmanager
 def _refusals(status: int) -> Iterator[None]:
-    """Whatever the library finds wrong is a refusal: an answer comes from outside and may be anything."""
+    """Convert any error of the library into a refusal, since responses are untrusted input."""
     try:
         yield
     except Problem:

@@ -1,4 +1,4 @@
-"""Sign-ins kept on the server: they end when idle, after twelve hours, at sign-out, or when revoked."""
+"""Sign-in sessions on the server: they end when idle, after twelve hours, at sign-out, or when revoked."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOST_KEPT: Final = 1000
 
 @dataclasses.dataclass(frozen=True)
 class _Login:
-    """One sign-in as it is stored, or as it is kept while the disk refuses to be written."""
+    """One sign-in as stored in the database, or in memory while the disk is not writable."""
 
     user_id: str
     last_seen_at: dt.datetime
@@ -36,16 +36,16 @@ class _Login:
 
 
 class Logins:
-    """The open sign-ins.
+    """Open sign-ins.
 
-    While the disk refuses to be written, people still come in, stay and go: what cannot be stored is kept in
-    memory and ends with the process.
+    While the disk is not writable, users can still sign in, work and sign out: sessions are then held in
+    memory and end with the process.
 
     Parameters
     ----------
     db : the database.
-    idle, absolute : life without activity, and life in all (docs/how-to/operations.md, "Settings").
-    clock : aware time now.
+    idle, absolute : lifetime without activity, and in total (docs/how-to/operations.md, "Settings").
+    clock : returns the current time, aware.
     """
 
     def __init__(
@@ -66,73 +66,77 @@ class Logins:
         self._ended: set[str] = set()  # ends that the disk refused
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
-        """Open a sign-in and return its new token; the token the browser came with, if any, ends here."""
-        at = self._clock()
+        """Open a sign-in and return its new token; the browser's previous token, if any, is revoked."""
+        time = self._clock()
         if replaces is not None:
             self.end(c, token_hash(replaces))
         gone = login_session.c.token_sha256.in_(self._ended)
-        c.execute(delete(login_session).where((login_session.c.expires_at <= at) | gone))
+        c.execute(delete(login_session).where((login_session.c.expires_at <= time) | gone))
         token = new_token()
         c.execute(
             insert(login_session).values(
                 token_sha256=token_hash(token),
                 user_id=user_id,
-                created_at=at,
-                last_seen_at=at,
-                expires_at=at + self._absolute,
+                created_at=time,
+                last_seen_at=time,
+                expires_at=time + self._absolute,
             )
         )
         return token
 
     def keep(self, user_id: str, replaces: str | None) -> str | None:
-        """Open a sign-in in memory, when the disk refuses to store it; None when too many are kept."""
-        at = self._clock()
+        """Open a sign-in in memory while the disk is not writable; None if there are too many."""
+        time = self._clock()
         if replaces is not None:
             self._forget(token_hash(replaces))
-        self._kept = {k: v for k, v in self._kept.items() if v.expires_at > at}
+        self._kept = {k: v for k, v in self._kept.items() if v.expires_at > time}
         if len(self._kept) >= MOST_KEPT:
             return None
         token = new_token()
-        self._kept[token_hash(token)] = _Login(user_id, at, at + self._absolute)
+        self._kept[token_hash(token)] = _Login(user_id, time, time + self._absolute)
         return token
 
     def find(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Return who holds this token and count the visit as activity; None when it is unknown or over.
+        """Return the identity for a token and count the request as activity; None if unknown or expired.
 
         Parameters
         ----------
-        parts : of the address that is asked for, to tell whether they may be opened.
+        parts : path parameters, for which access is determined as well.
         """
         return self.touch(token_hash(token), parts)
 
     def look(self, token: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Return the same without counting it as activity."""
-        found = self._open(token_hash(token), self._clock(), parts)
-        return None if found is None else found[1]
+        """Return the identity for a token without counting the request as activity."""
+        session = self._open(token_hash(token), self._clock(), parts)
+        return None if session is None else session[1]
 
     def seconds_left(self, login_id: str) -> float:
-        """Seconds until a sign-in ends if nobody does anything; 0 when it is over. Not activity itself."""
-        at = self._clock()
-        found = self._open(login_id, at)
-        if found is None:
+        """Seconds until a sign-in expires without activity; 0 if it has expired. Does not count as
+        activity.
+        """
+        time = self._clock()
+        session = self._open(login_id, time)
+        if session is None:
             return 0.0
-        login, _ = found
-        return (min(login.expires_at, login.last_seen_at + self._idle) - at).total_seconds()
+        login, _ = session
+        return (min(login.expires_at, login.last_seen_at + self._idle) - time).total_seconds()
 
     def touch(self, login_id: str, parts: Mapping[str, str] = NOTHING) -> Identity | None:
-        """Count a running view or replay as activity; None when the sign-in is over, so the view must end."""
-        at = self._clock()
-        found = self._open(login_id, at, parts)
-        if found is None:
+        """Count a running view or replay as activity; None if the sign-in has ended and the view must
+        close.
+        """
+        time = self._clock()
+        session = self._open(login_id, time, parts)
+        if session is None:
             return None
-        login, identity = found
+        login, identity = session
         # a short idle time must not end between two writes
-        if login.last_seen_at <= at - min(TOUCH_EVERY, self._idle / 4):
-            self._write_seen(login_id, at)
+        if login.last_seen_at <= time - min(TOUCH_EVERY, self._idle / 4):
+            self._write_seen(login_id, time)
         return identity
 
     def close(self, login_id: str) -> None:
-        """End one sign-in, also on a disk that refuses to be written."""
+        """End one sign-in, also while the disk is not writable."""
         try:
             with self._db.write() as c:
                 self.end(c, login_id)
@@ -147,7 +151,7 @@ class Logins:
         c.execute(delete(login_session).where(login_session.c.token_sha256 == login_id))
 
     def end_all(self, c: Connection, user_id: str, but: str | None = None) -> None:
-        """End every sign-in of one person, except the one (by its login id) that asks for it."""
+        """End every sign-in of one user, except the one with the given login id."""
         for login_id in [k for k, v in self._kept.items() if v.user_id == user_id and k != but]:
             self._kept.pop(login_id, None)
         c.execute(
@@ -157,28 +161,28 @@ class Logins:
         )
 
     def _open(
-        self, login_id: str, at: dt.datetime, parts: Mapping[str, str] = NOTHING
+        self, login_id: str, time: dt.datetime, parts: Mapping[str, str] = NOTHING
     ) -> tuple[_Login, Identity] | None:
-        """The sign-in with who it is, None when it is unknown or over."""
+        """The sign-in and its identity, None if it is unknown or expired."""
         if login_id in self._ended:
             return None
-        kept = self._kept.get(login_id)
+        held = self._kept.get(login_id)
         opens = opens_parts(parts).label("opens")
         stored = select(login_session.c.last_seen_at, login_session.c.expires_at, user, opens).join(
             user, user.c.id == login_session.c.user_id
         )
         query = (
             stored.where(login_session.c.token_sha256 == login_id)
-            if kept is None
-            else select(user, opens).where(user.c.id == kept.user_id)
+            if held is None
+            else select(user, opens).where(user.c.id == held.user_id)
         )
-        found = self._db.ask(query.where(user.c.active))
-        if not found:
+        rows = self._db.ask(query.where(user.c.active))
+        if not rows:
             return None
-        [person] = found
-        login = kept or _Login(person.id, person.last_seen_at, person.expires_at)
-        seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
-        if login.expires_at <= at or seen <= at - self._idle:
+        [person] = rows
+        login = held or _Login(person.id, person.last_seen_at, person.expires_at)
+        last_seen = max(login.last_seen_at, self._seen.get(login_id, login.last_seen_at))
+        if login.expires_at <= time or last_seen <= time - self._idle:
             return None
         identity = Identity(
             person.id,
@@ -189,16 +193,16 @@ class Logins:
             person.language,
             opens=bool(person.opens),
         )
-        return dataclasses.replace(login, last_seen_at=seen), identity
+        return dataclasses.replace(login, last_seen_at=last_seen), identity
 
-    def _write_seen(self, login_id: str, at: dt.datetime) -> None:
+    def _write_seen(self, login_id: str, time: dt.datetime) -> None:
         if login_id not in self._kept:
             try:
                 with self._db.write() as c:
                     c.execute(
                         update(login_session)
                         .where(login_session.c.token_sha256 == login_id)
-                        .values(last_seen_at=at)
+                        .values(last_seen_at=time)
                     )
             except OperationalError as error:
                 # busy or refused: a page that only reads need not wait for this again
@@ -207,9 +211,9 @@ class Logins:
             else:
                 self._seen.pop(login_id, None)
                 return
-        self._seen[login_id] = at
+        self._seen[login_id] = time
 
     def _forget(self, login_id: str) -> None:
-        """End a sign-in in memory; a stored one ends by itself when it is idle."""
+        """End a sign-in in memory; a stored one expires when idle."""
         if self._kept.pop(login_id, None) is None:
             self._ended.add(login_id)

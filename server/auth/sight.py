@@ -1,8 +1,8 @@
-"""Who may open which patient, where the clinic has care teams: the one rule that every read passes.
+"""Access to patients in clinics with care teams: the rule applied to every read.
 
-An administrator sees everybody; all others see the patients whose care team they are in, and those whom they
-have opened in an emergency, until that ends. A route whose address names something of a patient asks through
-its door (server/auth/access.py); a list asks `only_seen`, and its service cannot be called without.
+Administrators see all patients; other users see the patients of their care teams, and those they have opened
+in an emergency until that access ends. A route whose path refers to a patient's data is checked by its
+dependency (server/auth/access.py); lists use `only_seen`, which their services require.
 """
 
 from __future__ import annotations
@@ -93,37 +93,37 @@ NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
 """Parts of an address that names nothing."""
 
 
-def only_seen(query: Select[Any], who: Identity | None) -> Select[Any]:
-    """Leave of a query over `patient` what a person may open; None = the system, which sees everybody."""
-    if who is None or who.is_admin:
+def only_seen(query: Select[Any], user: Identity | None) -> Select[Any]:
+    """Restrict a query over `patient` to those the user may open; None = the system, which sees all."""
+    if user is None or user.is_admin:
         return query
-    return query.where(~TEAMS_ARE_ON | _is_seen(who.user_id, patient.c.id))
+    return query.where(~TEAMS_ARE_ON | _is_seen(user.user_id, patient.c.id))
 
 
-def may_open(c: Connection, who: Identity, parts: Mapping[str, str]) -> bool:
-    """Whether a person may open all that parts of an address name; of what is not there False as well."""
-    return bool(c.execute(select(opens_parts(parts)).where(user.c.id == who.user_id)).scalar())
+def may_open(c: Connection, identity: Identity, parts: Mapping[str, str]) -> bool:
+    """Whether a user may open everything that the path parameters refer to; False if any does not exist."""
+    return bool(c.execute(select(opens_parts(parts)).where(user.c.id == identity.user_id)).scalar())
 
 
 def list_hidden(c: Connection, user_id: str, parts: Mapping[str, str]) -> list[str]:
-    """Ids of the patients that parts of an address name and whose team this person is not in."""
-    found: set[str] = set()
+    """Ids of the patients that path parameters refer to and whose care team does not include the user."""
+    hidden_ids: set[str] = set()
     for name in parts.keys() & OWNER.keys():
         query, own = OWNER[name]
         hidden = ~_is_seen(user_id, query.selected_columns[0])
-        found.update(c.execute(query.where(own == parts[name], hidden)).scalars())
-    return sorted(found)
+        hidden_ids.update(c.execute(query.where(own == parts[name], hidden)).scalars())
+    return sorted(hidden_ids)
 
 
-def find_emergency(c: Connection, who: Identity | None, patient_id: str) -> Row[Any] | None:
-    """The access in an emergency by which alone a person sees a patient; None = seen without one, or not."""
-    if who is None or who.is_admin or not c.execute(select(TEAMS_ARE_ON)).scalar_one():
+def find_emergency(c: Connection, user: Identity | None, patient_id: str) -> Row[Any] | None:
+    """The emergency access that alone lets a user see a patient; None if not needed or not granted."""
+    if user is None or user.is_admin or not c.execute(select(TEAMS_ARE_ON)).scalar_one():
         return None
-    mine = (care_team_member.c.user_id == who.user_id) & (care_team_member.c.patient_id == patient_id)
+    mine = (care_team_member.c.user_id == user.user_id) & (care_team_member.c.patient_id == patient_id)
     if c.execute(select(care_team_member.c.since).where(mine)).first():
         return None
     query = select(emergency_access).where(
-        emergency_access.c.user_id == who.user_id,
+        emergency_access.c.user_id == user.user_id,
         emergency_access.c.patient_id == patient_id,
         is_emergency_open(),
     )
@@ -131,13 +131,15 @@ def find_emergency(c: Connection, who: Identity | None, patient_id: str) -> Row[
 
 
 def is_emergency_open() -> ColumnElement[bool]:
-    """Whether an access in an emergency goes on, as a condition of a statement."""
-    at = literal(now(), emergency_access.c.ends_at.type)
-    return emergency_access.c.ended_at.is_(None) & (emergency_access.c.ends_at > at)
+    """SQL condition: the emergency access is active."""
+    time = literal(now(), emergency_access.c.ends_at.type)
+    return emergency_access.c.ended_at.is_(None) & (emergency_access.c.ends_at > time)
 
 
 def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
-    """The same as a column of a statement over `user`: the one that tells who asks answers this too."""
+    """SQL condition over `user`: access to the path parameters, so that identity and access need one
+    query.
+    """
     named = [(OWNER[name], value) for name, value in parts.items() if name in OWNER]
     if not named:
         return true()
@@ -149,7 +151,7 @@ def opens_parts(parts: Mapping[str, str]) -> ColumnElement[bool]:
 
 
 def sees_patient(patient_id: ColumnElement[str]) -> ColumnElement[bool]:
-    """Whether the account of a statement over `user` may open a patient, as a condition of the statement."""
+    """SQL condition over `user`: the account may open the patient."""
     return or_(user.c.role == Role.ADMIN.value, ~TEAMS_ARE_ON, _is_seen(user.c.id, patient_id))
 
 

@@ -1,6 +1,6 @@
-"""Counts failed sign-ins per account and per address, so that guessing a password takes years.
+"""Limits failed sign-ins per account and per address, so that guessing a password takes years.
 
-One web server counts in memory; several count together, in the database.
+A single web server counts in memory; several share their counts in the database.
 """
 
 from __future__ import annotations
@@ -36,35 +36,35 @@ Found = TypeVar("Found")
 
 
 class FailureTimes(Protocol):
-    """When what failed, by key."""
+    """Times of failures by key."""
 
     def list_times(self, key: Key) -> Sequence[float]:
-        """Times of a key, the oldest first."""
+        """Times of a key, oldest first."""
 
-    def add(self, key: Key, at: float) -> None:
-        """Note a failure."""
+    def add(self, key: Key, time: float) -> None:
+        """Add a failure."""
 
-    def remove(self, key: Key, at: float) -> None:
-        """Take one back; one that is not there is fine."""
+    def remove(self, key: Key, time: float) -> None:
+        """Remove a recorded failure; no error if absent."""
 
     def clear(self, key: Key) -> None:
-        """Forget those of a key."""
+        """Remove all failures of a key."""
 
     def clear_account(self, account: str) -> None:
-        """Forget those of an account, from wherever they came."""
+        """Remove all failures of an account, from any address."""
 
-    def forget(self, before: float) -> None:
-        """Forget old ones, now or later."""
+    def forget(self, cutoff: float) -> None:
+        """Remove expired failures, now or later."""
 
 
 class FailureStore(Protocol):
-    """Where they are kept."""
+    """Storage of failures."""
 
     def work(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """Call `do` while nobody else reads or writes them, and return what it returns."""
+        """Call `do` with exclusive access to the failures and return its result."""
 
     def look(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """The same for what only reads."""
+        """Call `do` for read-only access and return its result."""
 
 
 class Throttle:
@@ -72,7 +72,7 @@ class Throttle:
 
     Parameters
     ----------
-    clock : seconds; of all web servers the same where they count together.
+    clock : seconds; common to all web servers that share counts.
     """
 
     def __init__(
@@ -82,9 +82,9 @@ class Throttle:
         self._store: FailureStore = FailuresInMemory() if store is None else store
 
     def begin(self, account: str, address: str) -> float:
-        """Check, and count this attempt as a failure before the password is looked at; returns its time.
+        """Check the limit, count this attempt as a failure before verification, and return its time.
 
-        A burst of guesses cannot all pass before the first of them has failed.
+        Counting first keeps a burst of guesses from passing before the first of them has failed.
         """
 
         # who is stopped already costs others no turn
@@ -96,17 +96,17 @@ class Throttle:
 
         return self._store.work(do)
 
-    def withdraw(self, account: str, address: str, at: float) -> None:
-        """Take back an attempt that `begin` counted: it was right, or nobody could look at it."""
+    def withdraw(self, account: str, address: str, time: float) -> None:
+        """Remove an attempt counted by `begin`: it succeeded, or could not be verified."""
 
         def do(times: FailureTimes) -> None:
             for key in _keys(account, address):
-                times.remove(key, at)
+                times.remove(key, time)
 
         self._store.work(do)
 
     def check(self, account: str, address: str) -> None:
-        """Raise Problem 429 with Retry-After while one of the two has failed too often."""
+        """Raise Problem 429 with Retry-After while the account or the address has failed too often."""
         self._store.look(lambda times: self._require(times, account, address))
 
     def fail(self, account: str, address: str) -> None:
@@ -114,11 +114,11 @@ class Throttle:
         self._store.work(lambda times: self._count(times, account, address))
 
     def succeed(self, account: str, address: str) -> None:
-        """Forget the failures of somebody who mistyped a few times and has now signed in."""
+        """Clear the failures of this account from this address after a successful sign-in."""
         self._store.work(lambda times: times.clear((account, address)))
 
     def forgive(self, account: str) -> None:
-        """Forget all failures of an account: an administrator has given it a new password."""
+        """Clear all failures of an account, after an administrator has set a new password."""
         self._store.work(lambda times: times.clear_account(account))
 
     def _require(self, times: FailureTimes, account: str, address: str) -> None:
@@ -143,7 +143,7 @@ class Throttle:
 
 
 class FailuresInMemory:
-    """Those of one process."""
+    """Failures of one process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -160,15 +160,15 @@ class FailuresInMemory:
         """See FailureTimes."""
         return self._failures.get(key, ())
 
-    def add(self, key: Key, at: float) -> None:
+    def add(self, key: Key, time: float) -> None:
         """See FailureTimes."""
-        self._failures[key].append(at)
+        self._failures[key].append(time)
 
-    def remove(self, key: Key, at: float) -> None:
+    def remove(self, key: Key, time: float) -> None:
         """See FailureTimes."""
         times = self._failures.get(key)
-        if times is not None and at in times:
-            times.remove(at)
+        if times is not None and time in times:
+            times.remove(time)
             if not times:
                 del self._failures[key]
 
@@ -181,15 +181,15 @@ class FailuresInMemory:
         for key in [k for k in self._failures if k[0] == account]:
             del self._failures[key]
 
-    def forget(self, before: float) -> None:
-        """See FailureTimes; when there are many."""
+    def forget(self, cutoff: float) -> None:
+        """See FailureTimes; runs only when there are many entries."""
         if len(self._failures) > _MAX_KEYS:
-            for key in [k for k, times in self._failures.items() if times[-1] <= before]:
+            for key in [k for k, times in self._failures.items() if times[-1] <= cutoff]:
                 del self._failures[key]
 
 
 class SharedFailures:
-    """Those of all web servers, in the database; in memory while its disk refuses to be written."""
+    """Failures of all web servers, in the database; in memory while its disk is not writable."""
 
     def __init__(self, db: Database) -> None:
         self._db, self._memory = db, FailuresInMemory()
@@ -205,29 +205,29 @@ class SharedFailures:
             return self._memory.work(do)
 
     def look(self, do: Callable[[FailureTimes], Found]) -> Found:
-        """See FailureStore; those that wait in memory count too."""
+        """See FailureStore; includes failures not yet written."""
         self._memory.work(do)
         with self._db.read() as c:
             return do(_FailureRows(c))
 
 
 class _FailureRows:
-    """Those of one transaction."""
+    """Failures within one transaction."""
 
     def __init__(self, c: Connection) -> None:
         self._c = c
 
     def list_times(self, key: Key) -> Sequence[float]:
         query = select(failed_attempt.c.at).where(_is(key)).order_by(failed_attempt.c.at)
-        return [at.timestamp() for at in self._c.execute(query).scalars()]
+        return [time.timestamp() for time in self._c.execute(query).scalars()]
 
-    def add(self, key: Key, at: float) -> None:
+    def add(self, key: Key, time: float) -> None:
         account, address = key
-        row = {"id": new_id(), "account": account, "address": address, "at": _moment(at)}
+        row = {"id": new_id(), "account": account, "address": address, "at": _moment(time)}
         self._c.execute(insert(failed_attempt).values(row))
 
-    def remove(self, key: Key, at: float) -> None:
-        query = select(failed_attempt.c.id).where(_is(key), failed_attempt.c.at == _moment(at)).limit(1)
+    def remove(self, key: Key, time: float) -> None:
+        query = select(failed_attempt.c.id).where(_is(key), failed_attempt.c.at == _moment(time)).limit(1)
         self._c.execute(delete(failed_attempt).where(failed_attempt.c.id.in_(query.scalar_subquery())))
 
     def clear(self, key: Key) -> None:
@@ -236,8 +236,8 @@ class _FailureRows:
     def clear_account(self, account: str) -> None:
         self._c.execute(delete(failed_attempt).where(failed_attempt.c.account == account))
 
-    def forget(self, before: float) -> None:
-        self._c.execute(delete(failed_attempt).where(failed_attempt.c.at <= _moment(before)))
+    def forget(self, cutoff: float) -> None:
+        self._c.execute(delete(failed_attempt).where(failed_attempt.c.at <= _moment(cutoff)))
 
 
 def _is(key: Key) -> ColumnElement[bool]:
@@ -245,13 +245,13 @@ def _is(key: Key) -> ColumnElement[bool]:
     return and_(failed_attempt.c.account == account, failed_attempt.c.address == address)
 
 
-def _moment(at: float) -> dt.datetime:
-    return dt.datetime.fromtimestamp(at, dt.UTC)
+def _moment(timestamp: float) -> dt.datetime:
+    return dt.datetime.fromtimestamp(timestamp, dt.UTC)
 
 
 def _wait(times: Sequence[float], limit: int, now: float) -> float:
     """Seconds until fewer than `limit` of these failures are within the window."""
-    failures = [at for at in times if at > now - WINDOW_S]
+    failures = [time for time in times if time > now - WINDOW_S]
     return failures[-limit] + WINDOW_S - now if len(failures) >= limit else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Random tokens: the browser or the console holds the token, the database only its SHA-256."""
+"""Random tokens: the browser or console holds the token, the database only its SHA-256."""
 
 from __future__ import annotations
 
@@ -14,5 +14,5 @@ def new_token() -> str:
 
 
 def token_hash(token: str) -> str:
-    """Return what the database keeps; a fast hash is enough for 256 random bits."""
+    """Return the hash stored in the database; a fast hash is sufficient for 256 random bits."""
     return hashlib.sha256(token.encode()).hexdigest()

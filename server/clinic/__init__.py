@@ -1,1 +1,1 @@
-"""Patients and their visits: identity, consent, notes, programme, sessions, sensors."""
+"""Patients and visits: identity, consent, notes, training programme, sessions, sensors."""

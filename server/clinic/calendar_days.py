@@ -1,4 +1,4 @@
-"""Which days a programme, a planned visit or a note may have: a mistyped year is refused."""
+"""Validation of calendar days for programmes, planned visits and notes; catches mistyped years."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ AHEAD: Final = dt.timedelta(days=3653)
 
 
 def require_day(day: dt.date) -> dt.date:
-    """Return the day; raises ServiceError bad_value for one before 1900 or more than ten years ahead."""
+    """Return the day; raises ServiceError bad_value if before 1900 or more than ten years ahead."""
     last = now().date() + AHEAD
     if FIRST <= day <= last:
         return day
@@ -24,7 +24,7 @@ def require_day(day: dt.date) -> dt.date:
 
 
 def move_years(day: dt.date, years: int) -> dt.date:
-    """The same day some years later or, below 0, earlier; 28 for 29 February where there is none."""
+    """The same day a number of years later, or earlier if negative; 29 February becomes 28 if necessary."""
     try:
         return day.replace(year=day.year + years)
     except ValueError:

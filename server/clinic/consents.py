@@ -1,7 +1,7 @@
-"""What a patient has agreed to: for what, since when, where it is written, and until when.
+"""Consents of patients: purpose, date, evidence and withdrawal.
 
-Nothing is overwritten: whoever no longer agrees gets a day of withdrawal, and may agree anew later. It leaves
-with the patient only.
+Consents are never overwritten: a withdrawal is recorded with its date, and consent can be given again later.
+They are deleted only together with the patient.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from sagittal.server.storage.schema.tables import new_id, now, user
 
 @dataclass(frozen=True)
 class Consent:
-    """One thing that a patient agreed to.
+    """Consent of a patient for one purpose.
 
     Parameters
     ----------
-    purpose : one of CONSENT_PURPOSES. evidence : where it is written, "signed form, file 12".
-    withdrawn_on : None = it holds. by : name of who wrote it down, None = the program.
+    purpose : one of CONSENT_PURPOSES. evidence : reference to the document, "signed form, file 12".
+    withdrawn_on : None = in force. by : name of the user who recorded it, None = the program.
     """
 
     id: str
@@ -47,7 +47,7 @@ def give(
     evidence: str,
     given_on: dt.date | None = None,
 ) -> Consent:
-    """Write down that a patient agreed, today unless said otherwise.
+    """Record a consent, dated today by default.
 
     Raises
     ------
@@ -82,13 +82,13 @@ def give(
 
 
 def withdraw(c: Connection, actor: audit.Actor | None, consent_id: str) -> Consent:
-    """Write down that a patient no longer agrees, from today; raises NotFound, Conflict withdrawn_already."""
-    found = get(c, consent_id)
-    if found.withdrawn_on is not None:
+    """Record a withdrawal as of today; raises NotFound, Conflict withdrawn_already."""
+    current = get(c, consent_id)
+    if current.withdrawn_on is not None:
         raise Conflict("withdrawn_already", "That it was withdrawn is written down already.")
     c.execute(update(consent).where(consent.c.id == consent_id).values(withdrawn_on=now().date()))
-    detail = {"consent_id": consent_id, "purpose": found.purpose}
-    audit.record(c, actor, "consent.withdrawn", "patient", found.patient_id, detail)
+    detail = {"consent_id": consent_id, "purpose": current.purpose}
+    audit.record(c, actor, "consent.withdrawn", "patient", current.patient_id, detail)
     return get(c, consent_id)
 
 
@@ -101,7 +101,7 @@ def get(c: Connection, consent_id: str) -> Consent:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Consent]:
-    """What a patient agreed to, what holds first, then the latest."""
+    """Consents of a patient, those in force first, then the latest."""
     query = _QUERY.where(consent.c.patient_id == patient_id)
     ordered = query.order_by(consent.c.withdrawn_on.is_not(None), consent.c.given_on.desc(), consent.c.id)
     return [Consent(**row._asdict()) for row in c.execute(ordered)]

@@ -1,4 +1,4 @@
-"""The planned visits of a training programme from its first training on (docs/science/feedback.md)."""
+"""Planned visits of a training programme, relative to its first training (docs/science/feedback.md)."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class CourseVisit:
 
 @dataclass(frozen=True)
 class Course:
-    """A template of visits in order.
+    """Template of a training programme: its visits in order.
 
     Parameters
     ----------
-    words : what it is, in one line. source : whose course it is.
+    words : one-line description. source : origin of the template.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Course:
     visits: tuple[CourseVisit, ...]
 
     def days(self, starts_on: dt.date) -> tuple[dt.date, ...]:
-        """Days of the visits when the first training is on this one."""
+        """Dates of the visits for a given date of the first training."""
         return tuple(starts_on + dt.timedelta(days=visit.day) for visit in self.visits)
 
 

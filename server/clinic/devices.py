@@ -1,7 +1,7 @@
-"""The clinic's sensors by serial number: what their takes showed of them, and where each was worn last.
+"""The clinic's sensors by serial number: quality checks from their trials, and their last placement.
 
-A row is written with the analysis it comes from and leaves with its recording (services/erasure.py). What is
-given here names no patient and no visit, days only, so no row of the audit says that it was looked at.
+Rows are written with the analysis they come from and deleted with its recording (services/erasure.py). They
+identify no patient and no visit, only days, so reading them is not audited.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ REMEMBERED_DAYS: Final = 365
 
 @dataclass(frozen=True, eq=False)
 class DatedCheck:
-    """What one take showed of a device, and where it was worn."""
+    """Check of a device in one trial, with its placement."""
 
     day: dt.date
     segment: str
@@ -39,7 +39,7 @@ class DatedCheck:
 
 @dataclass(frozen=True, eq=False)
 class KnownDevice:
-    """A device with its newest checks, oldest first, and what can be said of them; `takes` counts all."""
+    """A device with its latest checks, oldest first, and their summary; `takes` counts all trials."""
 
     device_id: str
     takes: int
@@ -48,13 +48,13 @@ class KnownDevice:
 
     @property
     def last(self) -> DatedCheck:
-        """The newest take in which it was worn."""
+        """The latest trial with the device."""
         return self.checks[-1]
 
 
 @dataclass(frozen=True)
 class LastPlaces:
-    """Where devices were worn in the clinic's last takes with them: serial → segment, each segment once."""
+    """Placement of devices in the clinic's latest trials: serial number → segment, each segment once."""
 
     segments: Mapping[str, str]
     day: dt.date | None
@@ -64,35 +64,34 @@ class LastPlaces:
 NO_PLACES: Final = LastPlaces({}, None)
 
 
-def keep_checks(c: Connection, recording_id: str, found: Sequence[Mapping[str, Any]]) -> None:
-    """Write what an analysis found of its devices, in the transaction that publishes it.
+def keep_checks(c: Connection, recording_id: str, checks: Sequence[Mapping[str, Any]]) -> None:
+    """Store the device checks of an analysis, in the transaction that publishes it.
 
-    Takes the place of what earlier analyses of the session said: they are of the same samples, or were
-    superseded.
+    Replaces the checks of earlier analyses of the session, which cover the same samples or are superseded.
 
     Parameters
     ----------
-    found : `devices` of analysis.json.
+    checks : `devices` of analysis.json.
     """
     own = select(recording.c.session_id).where(recording.c.id == recording_id).scalar_subquery()
     siblings = select(recording.c.id).where(recording.c.session_id == own).scalar_subquery()
     c.execute(delete(device_check).where(device_check.c.recording_id.in_(siblings)))
-    for one in found:
+    for one in checks:
         content = {name: one[name] for name in DeviceCheck.__dataclass_fields__}
         row = {name: one[name] for name in ("device_id", "segment", "exchanged")}
         c.execute(insert(device_check).values(**row, recording_id=recording_id, content=content, at=now()))
 
 
 def list_devices(c: Connection) -> list[KnownDevice]:
-    """Every device of the clinic, the one that was worn last first."""
+    """All devices of the clinic, most recently used first."""
     rows = c.execute(_newest_of_each(FOLLOWED)).all()
     grouped: dict[str, list[Any]] = {}
     for row in rows:
         grouped.setdefault(row.device_id, []).append(row)
-    known = [_known(found) for found in grouped.values()]
-    known.sort(key=lambda d: d.device_id)
-    known.sort(key=lambda d: d.last.day, reverse=True)
-    return known[:LISTED]
+    devices = [_known(checks) for checks in grouped.values()]
+    devices.sort(key=lambda d: d.device_id)
+    devices.sort(key=lambda d: d.last.day, reverse=True)
+    return devices[:LISTED]
 
 
 def get(c: Connection, device_id: str) -> KnownDevice:
@@ -106,20 +105,20 @@ def get(c: Connection, device_id: str) -> KnownDevice:
 def recall_places(
     c: Connection, device_ids: Collection[str] | None = None, *, but: str | None = None
 ) -> LastPlaces:
-    """Where devices sat in the last take of the clinic in which each was worn.
+    """Placement of devices in the clinic's latest trial with each.
 
-    Of two that claim one segment the one that was worn later has it. A take in which sensors were found
-    exchanged is passed over, as is what is older than `REMEMBERED_DAYS`.
+    If two devices claim the same segment, the more recently used one takes it. Trials with swapped sensors
+    and those older than `REMEMBERED_DAYS` are ignored.
 
     Parameters
     ----------
-    device_ids : None = all of the clinic, at most `LISTED`. but : a session that does not count.
+    device_ids : None = all of the clinic, at most `LISTED`. but : a session to exclude.
     """
     since = now().date() - dt.timedelta(days=REMEMBERED_DAYS)
-    wanted = _placed(device_ids).where(~device_check.c.exchanged, session.c.performed_on >= since)
+    query = _placed(device_ids).where(~device_check.c.exchanged, session.c.performed_on >= since)
     if but is not None:
-        wanted = wanted.where(session.c.id != but)
-    last = wanted.subquery()
+        query = query.where(session.c.id != but)
+    last = query.subquery()
     newest = (
         select(last)
         .where(last.c.place == 1)
@@ -135,7 +134,7 @@ def recall_places(
 
 
 def _placed(device_ids: Collection[str] | None) -> Select[Any]:
-    """Checks with the day of their take, each device's newest with place 1."""
+    """Checks with the day of their trial; the latest of each device has place 1."""
     newest_first = (session.c.performed_on.desc(), recording.c.created_at.desc())
     query = (
         select(

@@ -1,9 +1,9 @@
-"""Who a patient is: name, date of birth, numbers and contact beside the pseudonym, each value encrypted.
+"""Patient identities: name, date of birth, record numbers and contact, encrypted and linked to the pseudonym.
 
-Off until the operator makes a key (`sagittal identity-key make`). The key is a file outside the database; a
-key that is missing beside names that are there is an error, never a new key. The database knows which key
-seals, so that of several computers none seals by a file of its own. There is no search by name:
-what would find a name without opening every row would tell whoever has the database which rows are alike.
+Disabled until the operator creates a key (`sagittal identity-key make`). The key is a file outside the
+database; if identities exist, a missing key is an error and never replaced. The database records which key
+encrypts, so that of several computers none uses a different key. Names cannot be searched: an index that
+finds a name without decrypting every row would reveal to anyone with the database which rows are equal.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, delete, insert, select, update
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import UserText
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, ServiceError
@@ -32,7 +33,6 @@ from sagittal.server.storage.field_cipher import (
 )
 from sagittal.server.storage.schema.person_tables import identity_key, patient_identity
 from sagittal.server.storage.schema.tables import now
-from sagittal.web.user_text import UserText
 
 FIELDS: Final = ("name", "born_on", "record_number", "insurance_number", "contact")
 MOST: Final[Mapping[str, int]] = {
@@ -47,12 +47,12 @@ OLDEST: Final = dt.date(1850, 1, 1)
 
 @dataclass(frozen=True)
 class PatientIdentity:
-    """Who a patient is, as far as it was written down; no value is part of its repr, which may be logged.
+    """Identity of a patient as far as recorded; values are excluded from the repr, which may be logged.
 
     Parameters
     ----------
-    record_number : of the clinic's own records. contact : address, telephone, relatives; lines of text.
-    changed_at : None = nothing is written down.
+    record_number : of the clinic's records. contact : address, telephone, relatives; lines of text.
+    changed_at : None = nothing recorded.
     """
 
     name: str | None = field(default=None, repr=False)
@@ -64,17 +64,17 @@ class PatientIdentity:
 
 
 def are_kept(c: Connection, key_file: Path) -> bool:
-    """Whether this clinic keeps names: there is a key, or one that sealed and is missing."""
+    """Whether this clinic stores identities: a key exists, or has been used and is missing."""
     return _is_there(key_file) or _find_sealing(c) is not None
 
 
 def get(c: Connection, key_file: Path, patient_id: str) -> PatientIdentity:
-    """Who a patient is, empty where nothing is written down.
+    """Identity of a patient, empty if none is recorded.
 
     Raises
     ------
     NotFound; Conflict `identities_off`; KeyUnusable, ValueUnreadable
-        of the key, of a row.
+        the key, or a row, cannot be used.
     """
     patients.get(c, patient_id)
     keys = _read_keys(c, key_file)
@@ -85,32 +85,32 @@ def get(c: Connection, key_file: Path, patient_id: str) -> PatientIdentity:
 def change(
     c: Connection, key_file: Path, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
 ) -> PatientIdentity:
-    """Change some of FIELDS, None or empty = no longer written down; raises as `get`, ServiceError bad_value.
+    """Update some of FIELDS, None or empty = cleared; raises as `get`, ServiceError bad_value.
 
-    The key is read in the writing transaction: a change of keys cannot pass in between.
+    The key is read in the writing transaction, so that it cannot be changed in between.
     """
-    before = get(c, key_file, patient_id)
+    previous = get(c, key_file, patient_id)
     checked = {name: _check(name, value) for name, value in values.items()}
-    changed = sorted(name for name, value in checked.items() if getattr(before, name) != value)
+    changed = sorted(name for name, value in checked.items() if getattr(previous, name) != value)
     if not changed:
-        return before
-    after = {name: checked.get(name, getattr(before, name)) for name in FIELDS}
+        return previous
+    updated = {name: checked.get(name, getattr(previous, name)) for name in FIELDS}
     mine = patient_identity.c.patient_id == patient_id
     c.execute(delete(patient_identity).where(mine))
-    if any(value is not None for value in after.values()):
-        sealed = _seal(_read_sealing(c, key_file), patient_id, after)
+    if any(value is not None for value in updated.values()):
+        sealed = _seal(_read_sealing(c, key_file), patient_id, updated)
         c.execute(insert(patient_identity).values(patient_id=patient_id, changed_at=now(), **sealed))
     audit.record(c, actor, "identity.changed", "patient", patient_id, {"fields": changed})
     return get(c, key_file, patient_id)
 
 
 def make_key(db: Database, key_file: Path) -> str:
-    """Begin to keep names: make a key and return its name.
+    """Enable identities: create a key and return its name.
 
     Raises
     ------
     KeyUnusable
-        there is one, here or at another web server, or names are stored whose key is missing.
+        a key exists, here or on another web server, or identities exist whose key is missing.
     """
     with db.write() as c:
         if not _is_there(key_file) and (sealing := _find_sealing(c)) is not None:
@@ -126,16 +126,16 @@ def make_key(db: Database, key_file: Path) -> str:
 
 
 def discard_unreadable(db: Database, key_file: Path, *, really: bool, without_key: bool) -> list[str]:
-    """Ids of the patients whose identity the key in its place does not open; `really` removes these rows.
+    """Ids of the patients whose identity the current key cannot decrypt; `really` deletes these rows.
 
     Parameters
     ----------
-    without_key : the key that sealed is lost for good: remove all names, another key seals from now on.
+    without_key : the key in use is permanently lost: delete all identities and use another key from now on.
 
     Raises
     ------
     KeyUnusable
-        something would be removed only because the right key is not in its place.
+        identities would be deleted only because the correct key is missing.
     """
     with db.write() as c:
         if not are_kept(c, key_file):
@@ -166,10 +166,11 @@ def discard_unreadable(db: Database, key_file: Path, *, really: bool, without_ke
 
 
 def change_key(db: Database, key_file: Path) -> tuple[str, int]:
-    """Encrypt everything by a new key; returns its name and how many rows. Stopped midway, run it again.
+    """Re-encrypt all identities with a new key; return its name and the number of rows.
 
-    The file holds both keys until every row is written anew, so all can be read at any moment. It is written
-    in writing transactions only: who changes the key at the same time comes before or after.
+    The file contains both keys until every row has been rewritten, so all rows remain readable; an
+    interrupted change is resumed by running it again. The file is written in writing transactions only, which
+    serializes concurrent changes.
 
     Raises
     ------
@@ -196,20 +197,20 @@ def change_key(db: Database, key_file: Path) -> tuple[str, int]:
 
 
 def find_problems(c: Connection, key_file: Path) -> list[str]:
-    """Whose identity cannot be read and why, one sentence each; one alone where the key is not usable."""
+    """One sentence for each identity that cannot be decrypted, or a single one if the key is unusable."""
     if not are_kept(c, key_file):
         return []
     try:
         keys = _read_keys(c, key_file)
     except KeyUnusable as error:
         return [f"{key_file}: {error.message}"]
-    found = []
+    problems = []
     for row in c.execute(select(patient_identity).order_by(patient_identity.c.patient_id)):
         try:
             _open(keys, row._asdict())
         except SagittalError as error:
-            found.append(f"patient {row.patient_id}: {error.message}")
-    return found
+            problems.append(f"patient {row.patient_id}: {error.message}")
+    return problems
 
 
 def _open_all(c: Connection, keys: FieldKeys) -> None:
@@ -218,7 +219,7 @@ def _open_all(c: Connection, keys: FieldKeys) -> None:
 
 
 def _is_there(path: Path) -> bool:
-    """Whether a file is there; False also where nobody may look."""
+    """Whether a file exists; False also without permission."""
     try:
         return path.is_file()
     except OSError:
@@ -226,7 +227,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _find_sealing(c: Connection) -> str | None:
-    """Name of the key that seals, None before one is used."""
+    """Name of the key used for encryption, None before the first use."""
     return c.execute(select(identity_key.c.name)).scalar()
 
 
@@ -236,7 +237,7 @@ def _set_sealing(c: Connection, name: str) -> None:
 
 
 def _read_keys(c: Connection, key_file: Path) -> FieldKeys:
-    """The keys of the file, which the one that seals must be among; raises Conflict, KeyUnusable."""
+    """Keys in the file, which must include the one in use; raises Conflict, KeyUnusable."""
     if not are_kept(c, key_file):
         raise Conflict(
             "identities_off", "This clinic keeps no names: the operator makes a key for them first."
@@ -252,7 +253,7 @@ def _read_keys(c: Connection, key_file: Path) -> FieldKeys:
 
 
 def _read_sealing(c: Connection, key_file: Path) -> FieldKeys:
-    """The key that seals, alone; in a writing transaction, since the first that is used is it from now on."""
+    """The key in use only; requires a writing transaction, since the first use of a key is recorded."""
     keys = _read_keys(c, key_file)
     sealing = _find_sealing(c)
     if sealing is None:
@@ -280,7 +281,7 @@ def _seal(keys: FieldKeys, patient_id: str, values: Mapping[str, object]) -> dic
 
 
 def _check(name: str, value: object) -> object:
-    """A value as it is stored; what was typed is in no message, which may be logged."""
+    """Validate a value; error messages may be logged and do not contain it."""
     if name not in FIELDS:
         raise ServiceError("bad_value", "An identity has no such field.")
     if name == "born_on":

@@ -1,4 +1,4 @@
-"""Jobs as the pages list them: with the session and the patient they belong to."""
+"""Jobs as shown on pages: with their session and patient."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from sagittal.server.storage.schema.tables import ACTIVE_STATES, job, patient, r
 
 @dataclass(frozen=True)
 class ListedJob(JobView):
-    """A job and whose it is (None for jobs that belong to no recording)."""
+    """A job with its patient and session (None for jobs without a recording)."""
 
     session_id: str | None
     session_title: str | None
@@ -28,37 +28,37 @@ class ListedJob(JobView):
 
 
 def list_jobs(
-    c: Connection, who: Identity | None, *, active_only: bool = False, limit: int = 100
+    c: Connection, user: Identity | None, *, active_only: bool = False, limit: int = 100
 ) -> list[ListedJob]:
-    """Jobs of the patients that a person may open, the newest first; None = the system, all."""
-    query = only_seen(_QUERY, who).order_by(job.c.seq.desc()).limit(limit)
+    """Jobs of the patients that a user may open, newest first; None = the system, all."""
+    query = only_seen(_QUERY, user).order_by(job.c.seq.desc()).limit(limit)
     if active_only:
         query = query.where(job.c.state.in_(ACTIVE_STATES))
     return [_listed(row) for row in c.execute(query)]
 
 
 def list_active(c: Connection, patient_ids: Collection[str]) -> list[ListedJob]:
-    """All jobs of these patients that run or wait, those that run first, then the newest."""
+    """Queued and running jobs of these patients, running ones first, then the newest."""
     query = _QUERY.where(job.c.state.in_(ACTIVE_STATES), session.c.patient_id.in_(patient_ids))
     return [
         _listed(row) for row in c.execute(query.order_by((job.c.state == "running").desc(), job.c.seq.desc()))
     ]
 
 
-def count_active(db: Database, who: Identity) -> int:
-    """How many jobs of the patients that a person may open wait or run."""
-    [[count]] = db.ask(select_active_count(who))
+def count_active(db: Database, user: Identity) -> int:
+    """Number of queued and running jobs of the patients that a user may open."""
+    [[count]] = db.ask(select_active_count(user))
     return int(count)
 
 
-def select_active_count(who: Identity) -> Select[Any]:
-    """The statement that counts them."""
+def select_active_count(user: Identity) -> Select[Any]:
+    """SQL statement for `count_active`."""
     query = select(func.count()).select_from(_JOBS).where(job.c.state.in_(ACTIVE_STATES))
-    return only_seen(query, who)
+    return only_seen(query, user)
 
 
 def of_session(c: Connection, session_id: str, *, kind: str | None = None) -> list[JobView]:
-    """Jobs of one session, the newest first."""
+    """Jobs of one session, newest first."""
     query = _OF_SESSION if kind is None else _OF_SESSION.where(job.c.kind == kind)
     return [_listed(row) for row in c.execute(query, {"of_session": session_id})]
 
@@ -72,7 +72,7 @@ def get(c: Connection, job_id: str) -> ListedJob:
 
 
 def cancel(c: Connection, queue: JobQueue, actor: audit.Actor | None, job_id: str) -> JobView:
-    """Ask a job to stop (a finished one stays as it is); raises NotFound."""
+    """Request cancellation of a job (no effect if finished); raises NotFound."""
     view = queue.cancel(c, job_id)
     if view is None:
         raise NotFound("job", job_id)

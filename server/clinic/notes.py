@@ -1,4 +1,4 @@
-"""Dated notes about a patient: what was agreed, tried or observed on a day, in a therapist's own words."""
+"""Dated free-text notes of therapists about a patient."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_CHARACTERS = 10_000
 
 @dataclass(frozen=True)
 class PatientNote:
-    """A note; `by`, `by_id` = name and account of who wrote it, None = the program."""
+    """A note; `by`, `by_id` = name and account of the author, None = the program."""
 
     id: str
     patient_id: str
@@ -36,7 +36,7 @@ def add(
     content: str,
     written_on: dt.date | None = None,
 ) -> PatientNote:
-    """Add a note, of today unless said otherwise; raises NotFound, ServiceError bad_value."""
+    """Add a note, dated today by default; raises NotFound, ServiceError bad_value."""
     patients.get(c, patient_id)
     text = content.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
@@ -57,24 +57,24 @@ def add(
 
 
 def may_remove(note: PatientNote, actor: audit.Actor | None, *, of_others: bool) -> bool:
-    """Whether somebody who may write notes may remove this one: their own, or others' if so allowed."""
+    """Whether a user may remove this note: their own, or any if `of_others`."""
     return of_others or actor is None or note.by_id in {None, actor.user_id}
 
 
 def remove(c: Connection, actor: audit.Actor | None, note_id: str, *, of_others: bool = False) -> None:
-    """Remove a note for good; raises NotFound, NotAllowed not_yours.
+    """Delete a note; raises NotFound, NotAllowed not_yours.
 
     Parameters
     ----------
-    of_others : a note that somebody else wrote too.
+    of_others : also permit notes of other authors.
     """
-    found = get(c, note_id)
-    if not may_remove(found, actor, of_others=of_others):
+    note = get(c, note_id)
+    if not may_remove(note, actor, of_others=of_others):
         raise NotAllowed(
-            "not_yours", f"{found.by} wrote this note. Ask that person or an administrator to remove it."
+            "not_yours", f"{note.by} wrote this note. Ask that person or an administrator to remove it."
         )
     c.execute(delete(patient_note).where(patient_note.c.id == note_id))
-    audit.record(c, actor, "note.removed", "patient", found.patient_id, {"note_id": note_id})
+    audit.record(c, actor, "note.removed", "patient", note.patient_id, {"note_id": note_id})
 
 
 def get(c: Connection, note_id: str) -> PatientNote:
@@ -86,7 +86,7 @@ def get(c: Connection, note_id: str) -> PatientNote:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[PatientNote]:
-    """The notes about a patient, of the latest day first."""
+    """Notes about a patient, latest day first."""
     query = _QUERY.where(patient_note.c.patient_id == patient_id)
     rows = c.execute(query.order_by(patient_note.c.written_on.desc(), patient_note.c.created_at.desc()))
     return [PatientNote(**row._asdict()) for row in rows]

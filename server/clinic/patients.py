@@ -1,4 +1,4 @@
-"""Patients by pseudonym: made, changed, found; erasing one is server/safekeeping/erasure.py."""
+"""Patients by pseudonym: create, update, search; for erasure see server/safekeeping/erasure.py."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ CHANGEABLE = frozenset({"code", "sex", "birth_year", "height_m", "affected_side"
 
 @dataclass(frozen=True)
 class Patient:
-    """A patient with what a list shows of the visits.
+    """A patient, with a summary of the visits for lists.
 
     Parameters
     ----------
     code : the clinic's pseudonym, unique. sex : female, male or None. height_m : metres or None.
-    affected_side : left, right, or None for none or both. is_control : healthy, and agreed that these visits
-    serve as reference in this clinic.
-    sessions : number of visits. last_visit : day of the newest, None without one.
+    affected_side : left, right, or None for none or both. is_control : healthy, and consented to serve as a
+        reference in this clinic.
+    sessions : number of visits. last_visit : date of the latest, None without one.
     running : a job of one of the visits is queued or running.
     """
 
@@ -55,21 +55,21 @@ class Patient:
     running: bool
 
     def find_age(self, day: dt.date) -> int | None:
-        """Age in years as far as the year of birth tells it, None where that is not known."""
+        """Age in years from the year of birth, None if unknown."""
         return day.year - self.birth_year if self.birth_year else None
 
     def find_height(self, session: Session) -> float | None:
-        """Height at a visit in metres: as measured then, else the usual one."""
+        """Height in metres as measured at a visit, otherwise the patient's usual height."""
         return session.height_m if session.height_m is not None else self.height_m
 
 
 @dataclass(frozen=True)
 class PatientList:
-    """Patients that a list shows, and what its page says beside them.
+    """Patients of a list and the counts shown with it.
 
     Parameters
     ----------
-    total : patients that the person may open. active_jobs : jobs of theirs that wait or run.
+    total : patients that the user may open. active_jobs : their queued and running jobs.
     teams_on : the clinic has care teams.
     """
 
@@ -80,9 +80,9 @@ class PatientList:
 
 
 class CodeTaken(Conflict):
-    """Another patient has the code, or one that looks alike; None = which is not known.
+    """Another patient (None = unknown) has this code or a confusable one.
 
-    The message names it as it was typed: its exact spelling opens that patient in an emergency.
+    The message repeats the code as typed: its exact spelling would open that patient in an emergency.
     """
 
     def __init__(self, code: str, patient_id: str | None) -> None:
@@ -124,10 +124,10 @@ def create(
 def change(
     c: Connection, actor: audit.Actor | None, patient_id: str, values: Mapping[str, object]
 ) -> Patient:
-    """Change some of CHANGEABLE; raises NotFound, CodeTaken, ServiceError bad_value."""
-    before = get(c, patient_id)
+    """Update some of CHANGEABLE; raises NotFound, CodeTaken, ServiceError bad_value."""
+    previous = get(c, patient_id)
     checked = _checked(values)
-    changed = {name: value for name, value in checked.items() if getattr(before, name) != value}
+    changed = {name: value for name, value in checked.items() if getattr(previous, name) != value}
     if "code" in changed:
         _refuse_alike(c, str(changed["code"]), patient_id)
     if changed:
@@ -145,45 +145,45 @@ def get(c: Connection, patient_id: str) -> Patient:
     return Patient(**row._asdict())
 
 
-def count(c: Connection, who: Identity | None) -> int:
-    """How many patients there are that a person may open; None = the system, in all."""
-    return int(c.execute(_count(who)).scalar_one())
+def count(c: Connection, user: Identity | None) -> int:
+    """Number of patients that a user may open; None = the system, all."""
+    return int(c.execute(_count(user)).scalar_one())
 
 
-def _count(who: Identity | None) -> Select[Any]:
-    return only_seen(select(func.count()).select_from(patient), who)
+def _count(user: Identity | None) -> Select[Any]:
+    return only_seen(select(func.count()).select_from(patient), user)
 
 
 def list_patients(
-    c: Connection, who: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
+    c: Connection, user: Identity | None, *, search: str = "", limit: int = 200, offset: int = 0
 ) -> list[Patient]:
-    """Patients whose code or note contains `search` (any case), the latest visit first.
+    """Patients whose code or note contains `search` (case-insensitive), latest visit first.
 
     Parameters
     ----------
-    who : only those this person may open; None = the system, which sees everybody.
+    user : only those accessible to this user; None = the system, which sees all.
     """
-    return make_all(Patient, c.execute(_search(who, search).limit(limit).offset(offset)))
+    return make_all(Patient, c.execute(_search(user, search).limit(limit).offset(offset)))
 
 
-def list_counted(c: Connection, who: Identity, *, search: str = "", limit: int = 200) -> PatientList:
-    """The same with what its page says beside it, in one statement; in a second one where nobody is found."""
+def list_counted(c: Connection, user: Identity, *, search: str = "", limit: int = 200) -> PatientList:
+    """Patients with the counts shown with the list, in one statement (two if none match)."""
     counts = [
-        _count(who).correlate(None).scalar_subquery(),
-        jobs.select_active_count(who).correlate(None).scalar_subquery(),
+        _count(user).correlate(None).scalar_subquery(),
+        jobs.select_active_count(user).correlate(None).scalar_subquery(),
         TEAMS_ARE_ON,
     ]
     named = [x.label(f"count_{i}") for i, x in enumerate(counts)]
-    result = c.execute(_search(who, search).add_columns(*named).limit(limit))
+    result = c.execute(_search(user, search).add_columns(*named).limit(limit))
     names = tuple(result.keys())[: -len(named)]
     rows = result.all()
     total, active, teams_on = rows[0][-len(named) :] if rows else c.execute(select(*named)).one()
-    found = [Patient(**dict(zip(names, row, strict=False))) for row in rows]
-    return PatientList(found, total, active, bool(teams_on))
+    matching = [Patient(**dict(zip(names, row, strict=False))) for row in rows]
+    return PatientList(matching, total, active, bool(teams_on))
 
 
-def _search(who: Identity | None, search: str) -> Select[Any]:
-    query = only_seen(_listing(), who).order_by(
+def _search(user: Identity | None, search: str) -> Select[Any]:
+    query = only_seen(_listing(), user).order_by(
         _LAST_VISIT.desc().nulls_last(), patient.c.created_at.desc(), patient.c.id
     )
     if search.strip():
@@ -195,7 +195,7 @@ def _search(who: Identity | None, search: str) -> Select[Any]:
 
 
 def list_older(c: Connection, day: dt.date) -> list[Patient]:
-    """Patients whose newest visit, or who themselves without one, are older than a day; the oldest first."""
+    """Patients whose latest visit, or creation if none, is before a date; oldest first."""
     added = dt.datetime.combine(day, dt.time(), dt.UTC)
     is_older = (day > _LAST_VISIT) | (_LAST_VISIT.is_(None) & (patient.c.created_at < added))
     query = _listing().where(is_older).order_by(_LAST_VISIT.nulls_first(), patient.c.created_at, patient.c.id)
@@ -254,20 +254,20 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
 
 
 def _refuse_alike(c: Connection, code: str, own: str | None = None) -> None:
-    """Raise CodeTaken where another's code differs in case or in the form of letters only."""
-    for other_id, other in c.execute(select(patient.c.id, patient.c.code)):
-        if other_id != own and normalize("NFKC", other).casefold() == code.casefold():
+    """Raise CodeTaken if another code differs only in case or in the Unicode form of letters."""
+    for other_id, existing_code in c.execute(select(patient.c.id, patient.c.code)):
+        if other_id != own and normalize("NFKC", existing_code).casefold() == code.casefold():
             raise CodeTaken(code, other_id)
 
 
 class _explained:  # noqa: N801 - reads as a word: with _explained(code)
-    """Turn the database's refusal into a sentence."""
+    """Convert integrity errors of the database to CodeTaken or ServiceError."""
 
     def __init__(self, code: str) -> None:
         self._code = code
 
     def __enter__(self) -> None:
-        """Nothing to prepare."""
+        """No preparation necessary."""
 
     def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if not isinstance(error, IntegrityError):

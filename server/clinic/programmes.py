@@ -1,4 +1,4 @@
-"""A patient's programme: which visits are planned when, which took place, are missing, or come next."""
+"""Training programme of a patient: planned visits that are done, missed or upcoming."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ class PlannedVisit:
 
     Parameters
     ----------
-    week : of the programme, 1 = that of the first training, 0 = before. session_id : what took place.
-    performed_on : day of that session. state : done, missing (its day has passed), next, or planned.
+    week : of the programme, 1 = that of the first training, 0 = before. session_id : linked session.
+    performed_on : date of that session. state : done, missing (overdue), next, or planned.
     """
 
     id: str
@@ -45,7 +45,7 @@ class PlannedVisit:
 
 @dataclass(frozen=True)
 class Programme:
-    """The visits that are planned for a patient, in the order of their days; `words` says what it is."""
+    """Planned visits of a patient in order of date; `words` is a description."""
 
     id: str
     patient_id: str
@@ -57,31 +57,31 @@ class Programme:
 
     @property
     def ends_on(self) -> dt.date:
-        """Day of the last planned visit."""
+        """Date of the last planned visit."""
         return max(v.planned_on for v in self.visits)
 
     @property
     def next(self) -> PlannedVisit | None:
-        """The visit that comes next, None when none is left."""
+        """The next visit, None if none is left."""
         return next((v for v in self.visits if v.state == "next"), None)
 
     def count(self, state: VisitState) -> int:
-        """Visits in a state."""
+        """Number of visits in a state."""
         return sum(v.state == state for v in self.visits)
 
     def near(self, day: dt.date) -> PlannedVisit | None:
-        """The open visit that a session of this day most likely is."""
+        """The open visit that best matches a session on this date."""
         open_ = [v for v in self.visits if v.session_id is None and abs(v.planned_on - day) <= NEAR]
         return min(open_, key=lambda v: abs(v.planned_on - day), default=None)
 
 
 @dataclass(frozen=True)
 class Plans:
-    """Programmes of some patients.
+    """Programmes of several patients.
 
     Parameters
     ----------
-    kinds : as `list_kinds`. running : who is on a programme that has a visit to come.
+    kinds : see `list_kinds`. running : patients with upcoming visits in a programme.
     """
 
     kinds: Mapping[str, VisitKind]
@@ -96,17 +96,19 @@ def start(
     starts_on: dt.date,
     template: str = SIX_WEEKS.name,
 ) -> Programme:
-    """Put a patient on a programme; raises NotFound, Conflict programme_running, ServiceError bad_value."""
+    """Start a programme for a patient; raises NotFound, Conflict programme_running, ServiceError
+    bad_value.
+    """
     patients.get(c, patient_id)
     if template not in COURSES:
         raise ServiceError("bad_value", f"The programme is one of {', '.join(COURSES)}, not '{template}'.")
     course = COURSES[template]
     days = course.days(require_day(starts_on))
-    for other in of_patient(c, patient_id):
-        if min(days) <= other.ends_on and other.visits[0].planned_on <= max(days):
+    for active in of_patient(c, patient_id):
+        if min(days) <= active.ends_on and active.visits[0].planned_on <= max(days):
             raise Conflict(
                 "programme_running",
-                f"This patient has a programme until {other.ends_on}; end it first or start after that day.",
+                f"This patient has a programme until {active.ends_on}; end it first or start after that day.",
             )
     programme_id = new_id()
     row = {"id": programme_id, "patient_id": patient_id, "template": template, "starts_on": starts_on}
@@ -128,19 +130,19 @@ def start(
 
 def get(c: Connection, programme_id: str) -> Programme:
     """One programme; raises NotFound."""
-    found = _programmes(c, programme.c.id == programme_id)
-    if not found:
+    matches = _programmes(c, programme.c.id == programme_id)
+    if not matches:
         raise NotFound("programme", programme_id)
-    return found[0]
+    return matches[0]
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Programme]:
-    """All programmes of a patient, the newest first."""
+    """All programmes of a patient, newest first."""
     return _programmes(c, programme.c.patient_id == patient_id)
 
 
 def list_kinds(c: Connection, patient_ids: Collection[str]) -> dict[str, VisitKind]:
-    """What was planned of the sessions of these patients that are a visit of a programme, by session."""
+    """Kind of visit by session, for those sessions of these patients that belong to a programme."""
     query = (
         select(planned_visit.c.session_id, planned_visit.c.kind)
         .join(programme)
@@ -150,11 +152,11 @@ def list_kinds(c: Connection, patient_ids: Collection[str]) -> dict[str, VisitKi
 
 
 def read_plans(c: Connection, patient_ids: Collection[str], today: dt.date) -> Plans:
-    """What a list of these patients says of their programmes, in one statement."""
+    """Summary of the programmes of these patients for lists, in one statement."""
     columns = (planned_visit.c[name] for name in ("planned_on", "session_id", "kind"))
-    known = planned_visit.c.session_id.is_not(None) | (planned_visit.c.planned_on >= today)
+    relevant = planned_visit.c.session_id.is_not(None) | (planned_visit.c.planned_on >= today)
     query = select(programme.c.patient_id, *columns).join(planned_visit)
-    rows = c.execute(query.where(programme.c.patient_id.in_(patient_ids), known)).all()
+    rows = c.execute(query.where(programme.c.patient_id.in_(patient_ids), relevant)).all()
     return Plans(
         kinds={row.session_id: row.kind for row in rows if row.session_id is not None},
         running=frozenset(row.patient_id for row in rows if row.planned_on >= today),
@@ -164,12 +166,12 @@ def read_plans(c: Connection, patient_ids: Collection[str], today: dt.date) -> P
 def change_visit(
     c: Connection, actor: audit.Actor | None, visit_id: str, values: Mapping[str, Any]
 ) -> Programme:
-    """Move a planned visit to another day, say which session it was, or take that back with None.
+    """Reschedule a planned visit, or link it to a session (None = unlink).
 
     Raises
     ------
-    NotFound: the visit or the session. Conflict: visit_taken (it has another session), session_planned (the
-    session is another visit), other_patient. ServiceError bad_value.
+    NotFound: the visit or the session. Conflict: visit_taken (linked to another session), session_planned
+    (the session is linked to another visit), other_patient. ServiceError bad_value.
     """
     row = _visit(c, visit_id)
     unknown = values.keys() - {"planned_on", "session_id"}
@@ -190,16 +192,16 @@ def change_visit(
 
 
 def end(c: Connection, actor: audit.Actor | None, programme_id: str) -> None:
-    """Remove a programme and its plan; sessions stay; raises NotFound."""
-    found = get(c, programme_id)
+    """Remove a programme and its plan, but not its sessions; raises NotFound."""
+    current = get(c, programme_id)
     c.execute(delete(planned_visit).where(planned_visit.c.programme_id == programme_id))
     c.execute(delete(programme).where(programme.c.id == programme_id))
-    said = {"programme_id": programme_id, "done": found.count("done"), "visits": len(found.visits)}
-    audit.record(c, actor, "programme.ended", "patient", found.patient_id, said)
+    detail = {"programme_id": programme_id, "done": current.count("done"), "visits": len(current.visits)}
+    audit.record(c, actor, "programme.ended", "patient", current.patient_id, detail)
 
 
 def visit_of(c: Connection, session_id: str) -> PlannedVisit | None:
-    """The planned visit that a session was."""
+    """The planned visit linked to a session."""
     row = c.execute(_VISITS.where(planned_visit.c.session_id == session_id)).first()
     return None if row is None else _planned(row)
 
@@ -219,9 +221,9 @@ def _check_session(c: Connection, row: Any, session_id: str) -> None:
         raise Conflict("other_patient", "This session belongs to another patient.")
     if row.session_id not in {None, session_id}:
         raise Conflict("visit_taken", f"{row.label} has a session already; unlink that one first.")
-    other = visit_of(c, session_id)
-    if other is not None and other.id != row.id:
-        raise Conflict("session_planned", f"This session is {other.label} already; unlink it there first.")
+    linked = visit_of(c, session_id)
+    if linked is not None and linked.id != row.id:
+        raise Conflict("session_planned", f"This session is {linked.label} already; unlink it there first.")
 
 
 _VISITS = select(planned_visit, session.c.performed_on).join(
@@ -236,33 +238,33 @@ def _planned(row: Any) -> PlannedVisit:
 
 
 def _programmes(c: Connection, which: ColumnElement[bool]) -> list[Programme]:
-    """Programmes with their visits in one statement, the newest first; each has visits from its start on."""
+    """Programmes with their visits in one statement, newest first; each starts with its first visit."""
     theirs = _VISITS.add_columns(*(programme.c[name].label(f"of_{name}") for name in _OWN))
     query = theirs.join(programme, programme.c.id == planned_visit.c.programme_id).where(which)
     rows = c.execute(query.order_by(programme.c.starts_on.desc(), programme.c.id, planned_visit.c.position))
     today = now().date()
-    found = []
+    result = []
     for _, group in itertools.groupby(rows, key=lambda row: row.programme_id):
         planned = list(group)
         own = {name: getattr(planned[0], f"of_{name}") for name in _OWN}
         visits = judge_states(tuple(_planned(row) for row in planned), today)
-        found.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
-    return found
+        result.append(Programme(**own, words=COURSES[own["template"]].words, visits=visits))
+    return result
 
 
 _OWN = ("id", "patient_id", "template", "starts_on", "created_at")
 
 
 def judge_states(visits: tuple[PlannedVisit, ...], today: dt.date) -> tuple[PlannedVisit, ...]:
-    """Say of each visit whether it is done, missing, next or planned today; in the order of planned days."""
-    found: list[PlannedVisit] = []
+    """Determine the state of each visit: done, missed, next or planned; in order of date."""
+    result: list[PlannedVisit] = []
     ahead = False
     for visit in sorted(visits, key=lambda v: v.planned_on):
         if visit.session_id is not None:
-            found.append(replace(visit, state="done"))
+            result.append(replace(visit, state="done"))
         elif visit.planned_on < today:
-            found.append(replace(visit, state="missing"))
+            result.append(replace(visit, state="missing"))
         else:
-            found.append(replace(visit, state="planned" if ahead else "next"))
+            result.append(replace(visit, state="planned" if ahead else "next"))
             ahead = True
-    return tuple(found)
+    return tuple(result)

@@ -1,4 +1,4 @@
-"""Sessions: one visit's recordings of a patient, and in what state they are."""
+"""Sessions: the recordings of one visit of a patient, and their state."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICE
 
 @dataclass(frozen=True)
 class Session:
-    """A session with its patient's code and the state its pages show.
+    """A session with its patient's code and the state shown on pages.
 
     Parameters
     ----------
     state : empty (no files), uploaded, running (a job is queued or running), done (has a result), failed (the
         last job failed and there is no result).
     height_m : measured at this visit, None = use the patient's.
-    pace, aid, orthosis, shoes : how it was walked (core/subject/condition.py), None = not stated.
-    feedback : biofeedback was given; a live take sets it by itself.
-    has_video : a video was set beside its take.
+    pace, aid, orthosis, shoes : walking condition (core/subject/condition.py), None = not recorded.
+    feedback : biofeedback was given; set automatically by live trials.
+    has_video : a video is synchronised with its trial.
     """
 
     id: str
@@ -75,7 +75,7 @@ class Session:
     state: str
 
     def walked(self, belt_speed_mps: float | None = None) -> WalkingCondition:
-        """The condition of its take; the speed of a belt is in the manifest of its recording."""
+        """Walking condition of its trial; treadmill speed is in the manifest of its recording."""
         return WalkingCondition(
             self.pace,
             self.aid,
@@ -89,7 +89,7 @@ class Session:
 
 @dataclass(frozen=True)
 class WalkedSession:
-    """What a list needs of an analysed walk to find the one that it is compared with."""
+    """Attributes of an analysed walk that determine which walk it is compared with."""
 
     id: str
     performed_on: dt.date
@@ -112,7 +112,7 @@ def create(
 
     Parameters
     ----------
-    condition : pace, aid, orthosis, shoes, feedback as of `Session`; not stated without them.
+    condition : pace, aid, orthosis, shoes, feedback as in `Session`; not recorded if omitted.
     """
     if c.execute(select(patient.c.id).where(patient.c.id == patient_id)).first() is None:
         raise NotFound("patient", patient_id)
@@ -135,9 +135,9 @@ def create(
 def change(
     c: Connection, actor: audit.Actor | None, session_id: str, values: Mapping[str, object]
 ) -> Session:
-    """Change some of CHANGEABLE; raises NotFound, ServiceError bad_value."""
-    before = get(c, session_id)
-    changed = {name: value for name, value in _checked(values).items() if getattr(before, name) != value}
+    """Update some of CHANGEABLE; raises NotFound, ServiceError bad_value."""
+    previous = get(c, session_id)
+    changed = {name: value for name, value in _checked(values).items() if getattr(previous, name) != value}
     if changed:
         c.execute(update(session).where(session.c.id == session_id).values(**changed))
         audit.record(c, actor, "session.changed", "session", session_id, {"fields": sorted(changed)})
@@ -153,13 +153,13 @@ def get(c: Connection, session_id: str) -> Session:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[Session]:
-    """All sessions of a patient, the newest day first."""
+    """All sessions of a patient, latest date first."""
     return make_all(Session, c.execute(_OF_PATIENT, {"of_patient": patient_id}))
 
 
 def search(
     c: Connection,
-    who: Identity | None,
+    user: Identity | None,
     *,
     search: str = "",
     protocol: Protocol | None = None,
@@ -167,14 +167,14 @@ def search(
     until: dt.date | None = None,
     ids: Collection[str] = (),
 ) -> list[Session]:
-    """Sessions of all patients that a person may open whose code or note has `search`, by patient and day.
+    """Sessions of all accessible patients whose code or note contains `search`, by patient and date.
 
     Parameters
     ----------
-    who : None = the system, which sees everybody.
-    since, until : days, both included, None = open. ids : only these of them; empty = all.
+    user : None = the system, which sees all.
+    since, until : dates, inclusive, None = open. ids : restrict to these; empty = all.
     """
-    query = only_seen(_QUERY, who).order_by(
+    query = only_seen(_QUERY, user).order_by(
         patient.c.code, session.c.performed_on, session.c.created_at, session.c.id
     )
     if text := search.strip():
@@ -193,18 +193,18 @@ def search(
 
 
 def newest_of(c: Connection, patient_ids: Collection[str]) -> dict[str, Session]:
-    """The newest session of each of these patients by patient id; who has none is left out."""
+    """Latest session of each of these patients by patient id; patients without one are omitted."""
     place = func.row_number().over(partition_by=session.c.patient_id, order_by=_NEWEST)
     ranked = (
         select(session.c.id, place.label("place")).where(session.c.patient_id.in_(patient_ids)).subquery()
     )
     newest = select(ranked.c.id).where(ranked.c.place == 1)
-    found = make_all(Session, c.execute(_QUERY.where(session.c.id.in_(newest))))
-    return {s.patient_id: s for s in found}
+    rows = make_all(Session, c.execute(_QUERY.where(session.c.id.in_(newest))))
+    return {s.patient_id: s for s in rows}
 
 
 def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[WalkedSession]]:
-    """Analysed walks without feedback by patient, the newest first; the speed of a belt is not looked up."""
+    """Analysed walks without feedback by patient, newest first; treadmill speed is not read."""
     done = exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session)
     columns = [session.c[name] for name in ("id", "patient_id", "performed_on", "protocol", *CHOICES)]
     query = (
@@ -213,14 +213,18 @@ def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[Wa
         .where(session.c.feedback.is_(False))
         .order_by(*_NEWEST)
     )
-    found: dict[str, list[WalkedSession]] = {}
+    walks: dict[str, list[WalkedSession]] = {}
     conditions: dict[tuple[Any, ...], WalkingCondition] = {}
     for session_id, patient_id, performed_on, *walked in c.execute(query):
-        told = tuple(walked)
-        if told not in conditions:  # a clinic has few
-            conditions[told] = WalkingCondition(**dict(zip(("protocol", *CHOICES), told, strict=True)))
-        found.setdefault(patient_id, []).append(WalkedSession(session_id, performed_on, conditions[told]))
-    return found
+        condition_key = tuple(walked)
+        if condition_key not in conditions:  # a clinic has few
+            conditions[condition_key] = WalkingCondition(
+                **dict(zip(("protocol", *CHOICES), condition_key, strict=True))
+            )
+        walks.setdefault(patient_id, []).append(
+            WalkedSession(session_id, performed_on, conditions[condition_key])
+        )
+    return walks
 
 
 _NEWEST = (session.c.performed_on.desc(), session.c.created_at.desc(), session.c.id)

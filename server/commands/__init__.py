@@ -1,1 +1,1 @@
-"""One module per command of the console script."""
+"""Commands of the console script, one module each."""

@@ -1,4 +1,4 @@
-"""`sagittal accept`: go on with this database, though it was emptied, put back or exchanged."""
+"""`sagittal accept`: trust this database although it was emptied, restored or replaced."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sagittal.server.settings import load_settings
 
 
 def accept(*, data_dir: DataDir = None) -> int:
-    """Trust the database from now on; 1 when it cannot be used."""
+    """Trust the database from now on; 1 if it cannot be used."""
     from sagittal.server.safekeeping import custody
     from sagittal.server.storage.db import Database
     from sagittal.server.storage.files.blob_opening import open_blobs

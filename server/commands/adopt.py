@@ -1,4 +1,4 @@
-"""`sagittal adopt`: live recordings that the database does not know; give one to a session."""
+"""`sagittal adopt`: live recordings missing from the database; assign one to a session."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from sagittal.server.settings import Settings, load_settings
 
 
 def adopt(take: str | None = None, /, *, session: str | None = None, data_dir: DataDir = None) -> int:
-    """List the logs, or make `take` a recording of `session`; 1 when that is not possible.
+    """List the logs, or make `take` a recording of `session`; 1 if that is not possible.
 
     Parameters
     ----------
     take
-        one of the list
+        id of a listed log
     session
-        the session's page, or its id
+        the session's URL or id
     """
     from sagittal.server.errors import ServiceError
     from sagittal.server.storage.migrate import MigrationError, require_current

@@ -1,4 +1,4 @@
-"""`sagittal analyse`: recording files in, result files out, by the same code the service runs."""
+"""`sagittal analyse`: recording files in, result files out, using the same code as the service."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def analyse(
     out
         folder for the results
     estimator
-        pose estimator; auto = the best for the sensors worn (docs/reference/estimators.md lists them)
+        pose estimator; auto = the best for the available sensors (see docs/reference/estimators.md)
     config
         JSON: parameters by stage, {"poses": {"least_valid": 0.7}}
 
     Returns
     -------
-    0 when at least one parameter was found, 1 when nothing could be analysed.
+    0 if at least one parameter was computed, 1 if nothing could be analysed.
     """
     from sagittal.core.formats import list_source_files, read_named_file
     from sagittal.server.results import analysing
@@ -71,7 +71,7 @@ def analyse(
 
 
 def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
-    """What the file says, the estimator of the command line put into it.
+    """Read configuration overrides from a file and add the estimator given on the command line.
 
     Raises
     ------
@@ -80,8 +80,8 @@ def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
     try:
         chosen = read_json(path.read_bytes()) if path else {}
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {why}.") from error
+        reason = getattr(error, "strerror", None) or error
+        raise InputError("config_unreadable", f"{path} cannot be read as JSON: {reason}.") from error
     if not isinstance(chosen, dict) or not isinstance(chosen.get("poses", {}), dict):
         raise InputError("config_unreadable", f'{path} is not of the form {{"stage": {{"name": value}}}}.')
     if estimator != "auto":
@@ -90,7 +90,7 @@ def read_overrides(path: Path | None, estimator: str) -> dict[str, Any]:
 
 
 def print_summary(result: dict[str, Any], out: Path) -> None:
-    """Parameters as a table, the estimator and its verdict, warnings as sentences, on stdout."""
+    """Print parameters as a table, the estimator, the data quality and warnings to stdout."""
     lines = [f"{'parameter':<36}{'side':<8}{'n':>4}{'mean':>10}{'sd':>9}  unit"]
     for p in result["parameters"]:
         if p["mean"] is None:
@@ -110,7 +110,7 @@ def print_summary(result: dict[str, Any], out: Path) -> None:
 
 
 def print_day(found: dict[str, Any]) -> None:
-    """Daily life in one look: time of each kind, steps and transitions, on stdout."""
+    """Print a summary of daily life to stdout: durations, steps and transitions."""
     times = [f"{kind} {minutes:.0f} min" for kind, minutes in found["minutes"].items() if minutes >= 0.5]
     counts = Counter(t["kind"] for t in found["transitions"])
     changes = [f"{kind} {number}" for kind, number in sorted(counts.items())]
@@ -140,7 +140,7 @@ class _ProgressBar:
         return self
 
     def stage(self, name: str, share: float) -> None:
-        """Show the stage that starts."""
+        """Show the current stage."""
         if self._plain:
             sys.stderr.write(f"{share:4.0%} {name}\n")
             sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""`sagittal backup`: one file with everything, while the service runs."""
+"""`sagittal backup`: back up everything into one file while the service runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def backup(
     prune: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Make one backup; 1 when there is none, or when a stored file was already gone or damaged.
+    """Create one backup; 1 on failure, or if a stored file was already missing or damaged.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def backup(
     key
         encrypt it (`sagittal keygen`)
     prune
-        then keep 7 days, 4 weeks and 12 months of that folder
+        then retain 7 daily, 4 weekly and 12 monthly backups in that folder
     """
     from sagittal.server.safekeeping import backups
     from sagittal.server.safekeeping.tombstones import TombstoneError
@@ -43,21 +43,21 @@ def backup(
         require_current(settings.database_source)
         clinic_key = None if key is None else read_key(key)
         with closing(Database(settings.database_source)) as db:
-            made = backups.make_backup(db, settings, target.absolute(), clinic_key)
-        gone = backups.prune(made.path.parent) if prune else []
+            result = backups.make_backup(db, settings, target.absolute(), clinic_key)
+        gone = backups.prune(result.path.parent) if prune else []
     except (BackupFileError, TombstoneError, backups.BackupError, MigrationError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    head = "none" if made.head is None else f"{made.head.seq}:{made.head.hash}"
-    sys.stdout.write(f"{made.path}: {made.files} files, {made.size} bytes, audit head {head}\n")
-    if made.left_out is not None:
+    head = "none" if result.head is None else f"{result.head.seq}:{result.head.hash}"
+    sys.stdout.write(f"{result.path}: {result.files} files, {result.size} bytes, audit head {head}\n")
+    if result.left_out is not None:
         sys.stdout.write(
-            f"The key of patients' names, {made.left_out}, is not in it: it is not encrypted (--key), or "
+            f"The key of patients' names, {result.left_out}, is not in it: it is not encrypted (--key), or "
             "the key cannot be read. Keep a copy of the key elsewhere.\n"
         )
     for path in gone:
         sys.stdout.write(f"removed {path}\n")
     sys.stdout.flush()
-    for space, sha256 in made.missing:
+    for space, sha256 in result.missing:
         sys.stderr.write(f"patient {space}: {sha256[:12]}… is gone or damaged; see `sagittal check`\n")
-    return 1 if made.missing else 0
+    return 1 if result.missing else 0

@@ -1,4 +1,4 @@
-"""`sagittal check`: is everything that is stored still what was stored?"""
+"""`sagittal check`: verify the integrity of all stored data."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from sagittal.server.settings import load_settings
 
 
 def check(*, head: Annotated[Path | None, Parameter(metavar="JSON")] = None, data_dir: DataDir = None) -> int:
-    """Check database, stored files, live logs, trash, audit chain, encrypted values; 1 if something is wrong.
+    """Check database, stored files, live logs, trash, audit chain, encrypted values; 1 on any problem.
 
     Parameters
     ----------
     head
-        newest audit row as it was, kept elsewhere
+        copy of the newest audit row, saved elsewhere
     """
     from sagittal.server.safekeeping import checks
     from sagittal.server.storage.db import Database

@@ -1,4 +1,4 @@
-"""`sagittal demo`: a temporary clinic with simulated patients; nothing is kept."""
+"""`sagittal demo`: a temporary clinic with simulated patients; nothing is stored permanently."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DEMO_WORKERS = 2
 
 
 def demo(*, port: Whole | None = None) -> int:
-    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C; the folder is removed at the end.
+    """Serve a clinic of simulated patients on 127.0.0.1 until Ctrl-C, then delete its folder.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def demo(*, port: Whole | None = None) -> int:
 
 
 def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
-    """Wait until the walk of a helper streams; False when the helper ended before."""
+    """Wait until a simulated walk is streaming; False if its process ended first."""
     from sagittal.server.live_takes import live
 
     pause = threading.Event()
@@ -96,12 +96,12 @@ def _wait_for_live(database: Source, helper: subprocess.Popen[bytes]) -> bool:
 
 
 def _report(database: Source) -> None:
-    """Say on the console what is being waited for, until every session is analysed."""
+    """Print progress to the console until every session is analysed."""
     from sagittal.server.demo.clinic import VISITS
     from sagittal.server.storage.schema.tables import job
     from sagittal.server.uploads.recordings import ANALYSE
 
-    began, told = time.monotonic(), ""
+    began, last_text = time.monotonic(), ""
     if is_compiling() or not has_compiled_filters():
         say("Compiling the filters (once for you and this version, up to a minute) …")
     pause = threading.Event()
@@ -114,8 +114,8 @@ def _report(database: Source) -> None:
                     .where(job.c.kind == ANALYSE, job.c.finished_at.is_not(None))
                 ).scalar_one()
             text = f"{ended} of {len(VISITS)} sessions analysed ({time.monotonic() - began:.0f} s)"
-            if ended and text.split(" (")[0] != told:
-                told = text.split(" (")[0]
+            if ended and text.split(" (")[0] != last_text:
+                last_text = text.split(" (")[0]
                 say(text)
             if ended >= len(VISITS):
                 return

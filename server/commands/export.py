@@ -1,4 +1,4 @@
-"""`sagittal export`: the results of an analysis as a file for another program."""
+"""`sagittal export`: convert the results of an analysis to another program's file format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def export(
     out: Path | None = None,
     code: str = "",
 ) -> int:
-    """Write the results in `folder` in one format; 1 = not possible.
+    """Write the results in `folder` in one format; 1 if not possible.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def export(
     kind
         xlsx, csv … (docs/reference/exports.md)
     out
-        file to write (default: export-<format>.<ending> there)
+        file to write (default: export-<format>.<extension> in that folder)
     code
-        pseudonym of the person, letters and digits
+        pseudonym of the subject, letters and digits
     """
     from sagittal.server.export.content import VisitFacts, open_content
     from sagittal.server.export.kinds import EXPORTED, find_kind, write_export

@@ -19,16 +19,16 @@ def identity_key(
     without_key: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Make the key, change it, or list and remove what it does not open; 1 when that is not possible.
+    """Create the key, change it, or list and remove identities it cannot decrypt; 1 if not possible.
 
     Parameters
     ----------
     what
-        discard: list what it does not open
+        discard: list identities it cannot decrypt
     really
-        remove what `discard` lists, for good
+        permanently delete what `discard` lists
     without_key
-        though the key is not there: lost for good
+        even if the key is missing: they are lost permanently
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.clinic import identities
@@ -41,25 +41,25 @@ def identity_key(
         require_current(settings.database_source)
         with closing(Database(settings.database_source)) as db:
             if what == "make":
-                said = _tell_made(file, identities.make_key(db, file))
+                message = _tell_made(file, identities.make_key(db, file))
             elif what == "change":
                 name, count = identities.change_key(db, file)
-                said = (
+                message = (
                     f"{count} patients' names are encrypted by key {name} now. Keep a copy of {file} on "
                     "paper. The old copy is needed for unencrypted backups from before.\n"
                 )
             else:
                 gone = identities.discard_unreadable(db, file, really=really, without_key=without_key)
-                said = "".join(f"patient {one}\n" for one in gone)
-                said += f"{len(gone)} patients' names cannot be read with {file}"
+                message = "".join(f"patient {one}\n" for one in gone)
+                message += f"{len(gone)} patients' names cannot be read with {file}"
                 if not gone:
-                    said += ".\n"
+                    message += ".\n"
                 else:
-                    said += " and were removed.\n" if really else "; --really removes them for good.\n"
+                    message += " and were removed.\n" if really else "; --really removes them for good.\n"
     except (MigrationError, SagittalError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
-    sys.stdout.write(said)
+    sys.stdout.write(message)
     sys.stdout.flush()
     return 0
 

@@ -1,4 +1,4 @@
-"""`sagittal keygen`: a key for encrypted backups."""
+"""`sagittal keygen`: create a key for encrypted backups."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 
 def keygen(path: Annotated[Path, Parameter(metavar="FILE")], /) -> int:
-    """Write a new key pair; 1 when the file exists."""
+    """Write a new key pair; 1 if the file exists."""
     from sagittal.server.storage.archive import BackupFileError, make_key
 
     try:

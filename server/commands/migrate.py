@@ -1,4 +1,4 @@
-"""`sagittal migrate`: bring the database to the schema of this version."""
+"""`sagittal migrate`: upgrade the database to the schema of this version."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sagittal.server.settings import load_settings
 
 
 def migrate(*, data_dir: DataDir = None) -> int:
-    """Upgrade the database in one transaction, after a backup; 1 when it belongs to a newer version."""
+    """Upgrade the database in one transaction, after a backup; 1 if it belongs to a newer version."""
     from sagittal.server.storage.migrate import MigrationError, require_database, upgrade
 
     settings = load_settings({"data_dir": data_dir})

@@ -1,4 +1,4 @@
-"""`sagittal move-blobs`: stored files from the data folder into a bucket."""
+"""`sagittal move-blobs`: move stored files from the data folder into a bucket."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from sagittal.server.settings import load_settings
 
 
 def move_blobs(*, data_dir: DataDir = None) -> int:
-    """Move stored files into SAGITTAL_BUCKET; 1 when that is not possible, or damaged ones stay."""
+    """Move stored files into SAGITTAL_BUCKET; 1 if not possible, or if damaged files remain."""
     from sagittal.server.storage import fs
     from sagittal.server.storage.files import blob_moving
 

@@ -1,4 +1,4 @@
-"""`sagittal move-database`: from the file in the data folder to PostgreSQL."""
+"""`sagittal move-database`: move the database from the data folder to PostgreSQL."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sagittal.server.settings import load_settings
 
 
 def move_database(*, data_dir: DataDir = None) -> int:
-    """Copy every row to SAGITTAL_DATABASE_URL and put the file aside; 1 when that is not possible."""
+    """Copy every row to SAGITTAL_DATABASE_URL and retire the file; 1 if not possible."""
     from sagittal.server import audit
     from sagittal.server.storage import fs
     from sagittal.server.storage.db import Database

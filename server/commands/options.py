@@ -1,4 +1,4 @@
-"""Types of what several commands take: an argument of such a type is read, named and explained as here."""
+"""Shared option types: parsing, name and help text of arguments used by several commands."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cyclopts import Parameter, Token
 
 
 def read_whole(_: object, tokens: Sequence[Token]) -> int:
-    """Read a whole number; cyclopts itself rounds 1.5 to 2.
+    """Parse a whole number; cyclopts itself rounds 1.5 to 2.
 
     Raises
     ------
     ValueError
-        it is none; the message says so.
+        the text is not a whole number.
     """
     try:
         return int(tokens[0].value)
@@ -24,12 +24,12 @@ def read_whole(_: object, tokens: Sequence[Token]) -> int:
 
 
 def read_seed(_: object, tokens: Sequence[Token]) -> int:
-    """Read a seed: generators take none below zero.
+    """Parse a seed, which must not be negative.
 
     Raises
     ------
     ValueError
-        it is none; the message says so.
+        the text is not a whole number of 0 or more.
     """
     text = tokens[0].value
     if not (text.isascii() and text.isdigit()):

@@ -1,4 +1,4 @@
-"""`sagittal replay`: a recording streamed to a server as a tablet would, with troubles made on purpose."""
+"""`sagittal replay`: stream a recording to a server like a tablet, optionally with simulated faults."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ def replay(
     jitter: Annotated[float, Parameter(metavar="MS")] = 0.0,
     batch: Whole = 10,
 ) -> int:
-    """Pair by code and stream files, folders or zips of one take.
+    """Pair by code and stream files, folders or zips of one trial.
 
     Parameters
     ----------
     to
         address of the server, http://host:port
     code
-        the code that the session's live page shows
+        pairing code from the session's live page
     speed
-        1 = as recorded (default), 0 = at once
+        1 = as recorded (default), 0 = immediately
     drop
-        cut the connection, chance per batch
+        probability per batch of dropping the connection
     jitter
-        delay batches by up to this
+        maximum delay of batches
     batch
-        samples in a batch (default 10)
+        samples per batch (default 10)
 
     Returns
     -------
-    0 when everything is acknowledged and the take is finished, 1 when not.
+    0 if everything is acknowledged and the trial is finished, otherwise 1.
     """
     from sagittal.server.live.playback import cut
 

@@ -1,4 +1,4 @@
-"""`sagittal research`: de-identified results of patients for research, and who is behind a pseudonym."""
+"""`sagittal research`: export de-identified results for research, or identify a pseudonym."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ def research(
     who: Annotated[str | None, Parameter(metavar="PSEUDONYM")] = None,
     data_dir: DataDir = None,
 ) -> int:
-    """Write the zip, or name the patient behind a pseudonym; 1 when that is not possible.
+    """Write the zip, or name the patient with a pseudonym; 1 if not possible.
 
     Parameters
     ----------
     out
         the file to write
     key
-        leads pseudonyms back; made anew where there is none
+        key of the pseudonyms; created if it does not exist
     patients
-        these only (default: all)
+        only these patients (default: all)
     signals
-        also what the sensors measured
+        include sensor signals
     without_consent
-        also who has not agreed to research
+        include patients without consent to research
     who
-        say whose pseudonym of this key it is; nothing is written
+        print the patient with this pseudonym; nothing is written
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
@@ -64,7 +64,7 @@ def research(
         with closing(Database(settings.database_source)) as db:
             if who is not None:
                 return _name_person(db, secret, who)
-            chosen, asked = _choose(db, patients, without_consent)
+            chosen, requested = _choose(db, patients, without_consent)
             target = (out or Path()).absolute()
             _write_zip(target, settings, db, secret, chosen, signals)
     except (MigrationError, SagittalError) as error:
@@ -72,32 +72,34 @@ def research(
         return 1
     if is_new:
         sys.stdout.write(f"{key} is a new key: who has it can lead pseudonyms back. Keep it in the clinic.\n")
-    sys.stdout.write(f"Written: {target}, {len(chosen)} patients; {asked - len(chosen)} have not agreed.\n")
+    sys.stdout.write(
+        f"Written: {target}, {len(chosen)} patients; {requested - len(chosen)} have not agreed.\n"
+    )
     sys.stdout.flush()
     return 0
 
 
-def _name_person(db: Database, secret: ResearchKey, who: str) -> int:
-    """Say whose pseudonym it is; 1 when it is nobody's."""
+def _name_person(db: Database, secret: ResearchKey, pseudonym: str) -> int:
+    """Print the patient with a pseudonym; 1 if unknown."""
     from sagittal.server.downloads import deidentified
 
     with db.read() as c:
-        found = deidentified.find_person(c, secret, who)
-    sys.stdout.write(f"{who} is {found.code}\n" if found else f"{who} is nobody here\n")
-    return 0 if found else 1
+        person = deidentified.find_person(c, secret, pseudonym)
+    sys.stdout.write(f"{pseudonym} is {person.code}\n" if person else f"{pseudonym} is nobody here\n")
+    return 0 if person else 1
 
 
 def _choose(db: Database, codes: tuple[str, ...], without_consent: bool) -> tuple[list[Patient], int]:
-    """Patients to export, and how many were asked for."""
+    """Patients to export, and the number requested."""
     from sagittal.core.errors import SagittalError
     from sagittal.server.downloads import deidentified
 
     with db.read() as c:
-        asked = deidentified.list_chosen(c, codes)
-        chosen = [p for p in asked if without_consent or deidentified.has_agreed(c, p.id)]
+        requested = deidentified.list_chosen(c, codes)
+        chosen = [p for p in requested if without_consent or deidentified.has_agreed(c, p.id)]
     if not chosen:
         raise SagittalError("nobody", "None of them has agreed to research; see --without-consent.")
-    return chosen, len(asked)
+    return chosen, len(requested)
 
 
 def _write_zip(
@@ -108,7 +110,7 @@ def _write_zip(
     chosen: Sequence[Patient],
     signals: bool,
 ) -> None:
-    """Write the file; it takes its place when it is whole."""
+    """Write the file under a temporary name and rename it when complete."""
     from sagittal.server.downloads import deidentified
     from sagittal.server.storage import fs
     from sagittal.server.storage.files.blob_opening import open_blobs

@@ -1,4 +1,4 @@
-"""`sagittal restore`: put a backup into an empty data folder, or try whether it could be."""
+"""`sagittal restore`: restore a backup into an empty data folder, or test whether it can be restored."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ def restore(
     test: bool = False,
     data_dir: DataDir = None,
 ) -> int:
-    """Restore a backup, everything verified first; 1 when nothing was put in place.
+    """Restore a backup after complete verification; 1 if nothing was restored.
 
     Parameters
     ----------
     key
         the private key of an encrypted backup
     erased
-        another list of who must not come back
+        additional list of erased patients that must not be restored
     test
-        only try it, in a folder that is removed again
+        only test it, in a temporary folder
     """
     from sagittal.server.safekeeping import restoring
     from sagittal.server.safekeeping.restore_room import RestoreError
@@ -41,22 +41,24 @@ def restore(
     try:
         clinic_key = None if key is None else read_key(key)
         if test:
-            found = restoring.try_restore(archive.absolute(), settings, clinic_key)
+            restored = restoring.try_restore(archive.absolute(), settings, clinic_key)
         else:
             gone = None if erased is None else read_tombstones(erased)
-            found = restoring.restore(archive.absolute(), settings, clinic_key, gone)
+            restored = restoring.restore(archive.absolute(), settings, clinic_key, gone)
     except (BackupFileError, TombstoneError, RestoreError) as error:
         sys.stderr.write(f"{error}\n")
         return 1
     sys.stdout.write(
         f"{'It could be restored' if test else f'Restored into {settings.data_dir}'}: the clinic of "
-        f"{found.created_at:%Y-%m-%d %H:%M}Z, {found.patients} patients, {found.sessions} visits, "
-        f"{found.files} files; every hash, the database and the audit chain are right. "
-        f"{found.erased_again} erased again.\n"
+        f"{restored.created_at:%Y-%m-%d %H:%M}Z, {restored.patients} patients, {restored.sessions} visits, "
+        f"{restored.files} files; every hash, the database and the audit chain are right. "
+        f"{restored.erased_again} erased again.\n"
     )
-    if found.missing:
-        sys.stdout.write(f"{found.missing} files were gone when the backup was made; see `sagittal check`.\n")
-    if not found.names_open:
+    if restored.missing:
+        sys.stdout.write(
+            f"{restored.missing} files were gone when the backup was made; see `sagittal check`.\n"
+        )
+    if not restored.names_open:
         sys.stdout.write(
             "The key that opens patients' names was not in the backup. It has to be at "
             f"{settings.identity_key_file}; `sagittal check` says whether it opens them.\n"
@@ -68,7 +70,7 @@ def restore(
 
 
 def _tell_names_key(settings: Settings) -> str:
-    """What to do with the key of patients' names that came with the backup where its place is another."""
+    """Print where to put the identity key from the backup if it belongs outside the data folder."""
     from sagittal.server.safekeeping.backups import IDENTITY_KEY
 
     came, place = settings.data_dir / IDENTITY_KEY, settings.identity_key_file

@@ -25,7 +25,7 @@ def serve(
     workers: Whole | None = None,
     data_dir: DataDir = None,
 ) -> int:
-    """Serve until SIGTERM or Ctrl-C; 1 when the folder is in use or belongs to a newer version.
+    """Serve until SIGTERM or Ctrl-C; 1 if the folder is in use or belongs to a newer version.
 
     Parameters
     ----------
@@ -54,12 +54,12 @@ def serve(
 
 
 def run(settings: Settings, announce: Callable[[str], None]) -> int:
-    """Run web server and workers; `announce` gets the public address once requests are answered.
+    """Run web server and workers; `announce` receives the public address once requests are answered.
 
     Raises
     ------
     SettingsError
-        it would listen on a network without TLS.
+        the server would listen on a network without TLS.
     """
     from sagittal.core.errors import SagittalError
     from sagittal.server.app import create_app
@@ -110,7 +110,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
 
 
 def _take_folder(settings: Settings, served: contextlib.ExitStack) -> ListeningSocket:
-    """Lock the data folder, listen and bring the database to this version; `served` holds what is open."""
+    """Lock the data folder, listen and upgrade the database; open resources are added to `served`."""
     from sagittal.server.nodes.registry import Nodes
     from sagittal.server.safekeeping.custody import (
         StrangersError,
@@ -177,16 +177,16 @@ def _explain_other(settings: Settings) -> str:
 
 
 def say(text: str) -> None:
-    """Print one line at once, also into a pipe."""
+    """Print one line and flush."""
     sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 
-def _when_started(server: object, then: Callable[[], None]) -> None:
-    """Call `then` once the server answers."""
+def _when_started(server: object, callback: Callable[[], None]) -> None:
+    """Call `then` once the server responds."""
     pause = threading.Event()
     while not getattr(server, "started", False):
         if getattr(server, "should_exit", False):
             return
         pause.wait(0.05)
-    then()
+    callback()

@@ -1,4 +1,4 @@
-"""`sagittal trash`: stored files that nothing refers to; put back those that the database knows again."""
+"""`sagittal trash`: list unreferenced stored files, or restore those referenced again."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from sagittal.server.settings import load_settings
 
 
 def trash(*, restore: bool = False, data_dir: DataDir = None) -> int:
-    """List the trash, or put back what the database refers to; 1 when the database cannot be used.
+    """List the trash, or restore referenced files; 1 if the database cannot be used.
 
     Parameters
     ----------
     restore
-        put back those that the database refers to
+        restore files that the database refers to
     """
     from sagittal.server.safekeeping import sweep
     from sagittal.server.storage.db import Database

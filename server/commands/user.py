@@ -1,4 +1,4 @@
-"""`sagittal user`: add a user or give one a new password, for whoever has the machine's console."""
+"""`sagittal user`: add a user or reset a password, from the server's console."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def user(
     role: Literal["admin", "clinician", "assistant", "viewer"] = "clinician",
     data_dir: DataDir = None,
 ) -> int:
-    """Ask for a password and store its hash.
+    """Prompt for a password and store its hash.
 
     An existing user keeps the role, gets the new password, and loses second factor and tokens.
     """
@@ -42,17 +42,17 @@ def user(
         is_new = not exists(settings.database_source)
         upgrade(settings.database_source, backups=settings.backups)
         with closing(Database(settings.database_source)) as db, db.write() as c:
-            known = c.execute(
+            user_id = c.execute(
                 select(table.c.id).where(table.c.name == name.strip().lower())
             ).scalar_one_or_none()
-            if known is None:
-                known = accounts.create(c, name.strip().lower(), None, Role(role), hashed).id
-                audit.record(c, None, "user.created", "user", known, {"role": role, "by": "console"})
+            if user_id is None:
+                user_id = accounts.create(c, name.strip().lower(), None, Role(role), hashed).id
+                audit.record(c, None, "user.created", "user", user_id, {"role": role, "by": "console"})
             else:
-                accounts.change(c, known, {"password_hash": hashed})
-                second_factor.remove(c, known)
-                api_tokens.revoke_all(c, known)
-                audit.record(c, None, "user.password_changed", "user", known, {"by": "console"})
+                accounts.change(c, user_id, {"password_hash": hashed})
+                second_factor.remove(c, user_id)
+                api_tokens.revoke_all(c, user_id)
+                audit.record(c, None, "user.password_changed", "user", user_id, {"by": "console"})
     except (Problem, MigrationError) as error:
         sys.stderr.write(f"{error.detail if isinstance(error, Problem) else error}\n")
         return 1

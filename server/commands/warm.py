@@ -1,4 +1,4 @@
-"""`sagittal warm`: compile the filters before anybody waits for them, at installation or in an image."""
+"""`sagittal warm`: compile the filters in advance, at installation or in an image."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from sagittal.server.storage.compile_cache import VARIABLE
 
 
 def warm() -> int:
-    """Compile every filter of walks, offline and live, into the folder of compiled filters; 0 when done.
+    """Compile every filter for walks, offline and live, into the folder of compiled filters; 0 when done.
 
-    What is in the folder already is only loaded. Processors differ: run it on the machine that will analyse.
+    Filters already in the folder are only loaded. Compiled code depends on the processor: run this on the
+    machine that will analyse.
     """
     steps: tuple[tuple[str, Callable[[], None]], ...] = (
         ("filters of takes and of live sessions, two at a time", compile_filters),
@@ -35,10 +36,10 @@ def warm() -> int:
 
 
 def _analyse_walk() -> None:
-    """By the real chain: which filters a walk asks for, only that knows."""
+    """Run the complete pipeline, as only it determines which filters a walk requires."""
     from sagittal.core.pipeline import analyse
     from sagittal.core.simulate import simulate_scenario
 
-    made = analyse(simulate_scenario("comfortable", 1).recording)
-    if made.problem is not None:
-        raise RuntimeError(f"The simulated walk was not analysed: {made.problem.message}")
+    analysis = analyse(simulate_scenario("comfortable", 1).recording)
+    if analysis.problem is not None:
+        raise RuntimeError(f"The simulated walk was not analysed: {analysis.problem.message}")

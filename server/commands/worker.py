@@ -1,4 +1,4 @@
-"""`sagittal worker`: one more worker on the data folder of a server."""
+"""`sagittal worker`: run an additional worker on the data folder of a server."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sagittal.server.settings import load_settings
 
 
 def worker(*, data_dir: DataDir = None) -> int:
-    """Work until SIGTERM or Ctrl-C; 1 when database or folder are not the server's."""
+    """Work until SIGTERM or Ctrl-C; 1 if database or folder do not match the server's."""
     from sagittal.server.safekeeping.custody import StrangersError
     from sagittal.server.storage import fs
     from sagittal.server.storage.migrate import MigrationError

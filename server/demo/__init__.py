@@ -1,1 +1,1 @@
-"""The temporary clinic of `sagittal demo`: simulated patients, one of whom walks live."""
+"""Temporary clinic of `sagittal demo`: simulated patients, one of whom walks live."""

@@ -1,7 +1,7 @@
-"""The simulated clinic of `sagittal demo`: virtual patients whose visits are uploaded like any recording.
+"""Simulated clinic of `sagittal demo`: visits of virtual patients, uploaded like real recordings.
 
-Run as a module it fills the data folder of its environment; simulating takes seconds of computing, so this is
-a process of its own.
+Run as a module, it fills the data folder of its environment; it runs in its own process because simulating
+takes seconds of CPU time.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ class DemoPerson:
 
 @dataclass(frozen=True)
 class DemoVisit:
-    """One visit.
+    """One visit of a simulated patient.
 
     Parameters
     ----------
-    script, seed : of sagittal.core.simulate. days_ago : when. worn : sensors, None = all seven.
-    condition : how it is walked. fails : a sensor and the second of the take from which on it is silent.
+    script, seed : see sagittal.core.simulate. days_ago : date. worn : sensors, None = all seven.
+    condition : walking condition. fails : a sensor and the time in s at which it drops out.
     """
 
     person: DemoPerson
@@ -130,7 +130,7 @@ PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
 
 
 def record(visit: DemoVisit) -> Simulation:
-    """Simulate the take of a visit."""
+    """Simulate the trial of a visit."""
     from sagittal.core.simulate import Dropout, simulate_scenario
 
     fails = visit.fails and (Dropout(*visit.fails, end_s=inf),)
@@ -138,36 +138,36 @@ def record(visit: DemoVisit) -> Simulation:
 
 
 def label_sensors(recording: Recording) -> Recording:
-    """The same take as one of the clinic's own seven sensors recorded it: one serial number per segment."""
+    """Label the sensors with the serial numbers of the clinic's set of seven, one per segment."""
     own = {d: SENSORS[s] for d, s in recording.segments.items() if s is not None}
     streams = {own[d]: replace(x, device_id=own[d]) for d, x in recording.streams.items()}
     return replace(recording, streams=streams, segments={own[d]: s for d, s in recording.segments.items()})
 
 
 def fill(settings: Settings) -> None:
-    """Add all patients and visits and ask for their analyses."""
+    """Add all patients and visits and request their analyses."""
     from sagittal.core.simulate import mt_files
 
     with closing(Database(settings.database_source)) as db:
         blobs = open_blobs(settings)
-        known: dict[str, str] = {}
+        patient_ids: dict[str, str] = {}
         with db.write() as c:
             for person in dict.fromkeys(v.person for v in VISITS):
                 fields = {k: v for k, v in vars(person).items() if k != "code"}
-                known[person.code] = patients.create(c, None, code=person.code, **fields).id
+                patient_ids[person.code] = patients.create(c, None, code=person.code, **fields).id
             person, content = PRESCRIBED
-            prescriptions.write(c, ReviewedAnalyses(blobs), None, known[person.code], content)
+            prescriptions.write(c, ReviewedAnalyses(blobs), None, patient_ids[person.code], content)
         for visit in VISITS:
-            made = record(visit)
-            worn = label_sensors(made.recording)
-            files = mt_files(worn, visit.script, made.first_counter)
-            manifest = _manifest(made) | {"sensors": dict(worn.segments)}
-            _add(db, blobs, settings, visit, known[visit.person.code], manifest, files)
+            simulation = record(visit)
+            labelled = label_sensors(simulation.recording)
+            files = mt_files(labelled, visit.script, simulation.first_counter)
+            manifest = _manifest(simulation) | {"sensors": dict(labelled.segments)}
+            _add(db, blobs, settings, visit, patient_ids[visit.person.code], manifest, files)
 
 
-def _manifest(made: Simulation) -> dict[str, object]:
-    """What a therapist would take with tape and goniometer while the person stands."""
-    truth = made.truth
+def _manifest(simulation: Simulation) -> dict[str, object]:
+    """Measurements that a therapist takes with tape measure and goniometer during quiet standing."""
+    truth = simulation.truth
     apart = truth.p["foot_l"][0, :2] - truth.p["foot_r"][0, :2]
     angles = {n: round(degrees(a)) for n, a in truth.zero_offset.items() if n.startswith(GONIOMETER)}
     subject = {"standing_width_m": round(float(hypot(*apart)), 2), "standing_angles_deg": angles}
@@ -184,10 +184,10 @@ def _add(
     files: Mapping[str, bytes],
 ) -> None:
     day = now().date() - dt.timedelta(days=visit.days_ago)
-    said = visit.condition.stated
+    stated_conditions = visit.condition.stated
     with db.write() as c:
         session = sessions.create(
-            c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **said
+            c, None, patient_id, title=visit.title, performed_on=day, note=visit.note, **stated_conditions
         )
     for name, content in files.items():
         with receiving.receive(db, blobs, settings, None, session.id, name) as upload:

@@ -1,7 +1,7 @@
-"""The patient of `sagittal demo` who walks live: a training with feedback, streamed as a tablet would.
+"""Live patient of `sagittal demo`: a training with feedback, streamed as from a tablet.
 
-Run as a module with the server's address, after the visits are analysed; the walk is simulated, the stream is
-not: code, socket, acknowledgements and finish are those of any tablet.
+Run as a module with the server's address after the visits are analysed. Only the walk is simulated: pairing
+code, socket, acknowledgements and finish are those of any tablet.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PER_BATCH: Final = 5
 
 
 def plan_training(laps: int = LAPS, seed: int = 5) -> Simulation:
-    """Laps of a corridor for about eight minutes, the steps longer from lap to lap."""
+    """Laps of a corridor for about eight minutes, with step length increasing from lap to lap."""
     from sagittal.core.simulate import PATIENTS, Arc, Script, Stand, Straight, simulate
     from sagittal.core.simulate.script import scale_script
     from sagittal.core.simulate.scripts import ON_SKIN
@@ -54,7 +54,7 @@ def plan_training(laps: int = LAPS, seed: int = 5) -> Simulation:
 
 
 def open_take(settings: Settings) -> str:
-    """A session of the patient with an open take; returns its code."""
+    """Create a session with an open trial; return its pairing code."""
     with closing(Database(settings.database_source)) as db, db.write() as c:
         patient = next(p for p in patients.list_patients(c, None) if p.code == STROKE.code)
         day = now().date()
@@ -63,7 +63,7 @@ def open_take(settings: Settings) -> str:
 
 
 async def stream_walk(address: str, code: str, recording: Recording, speed: float = 1.0) -> None:
-    """Stream a take until its end or until the therapist stops it."""
+    """Stream a trial until its end or until the therapist stops it."""
     pairing = pair(address, code)
     stopped = asyncio.Event()
 

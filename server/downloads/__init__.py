@@ -1,1 +1,1 @@
-"""What is taken out: exports, archives, studies, de-identified data, a patient's own data."""
+"""Downloads: exports, archives, studies, de-identified data, and all data of a patient."""

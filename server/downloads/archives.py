@@ -1,12 +1,12 @@
-"""The archive of a visit: one zip with the recording, what its analysis was told, settings and results.
+"""Archive of a visit: one zip with the recording, the manifest and settings of its analysis, and results.
 
-    sagittal-episode.json     version, when, SHA-256 of every file, what a person changed afterwards
-    recording/…               the original files; those inside zips and gz are taken out of them
+    sagittal-episode.json     version, time, SHA-256 of every file, later edits by users
+    recording/…               the original files, unpacked from zip and gz
     sagittal-manifest.json    the manifest of the analysis
-    config.json               its settings where they differ from the defaults
-    results/…                 result files as they were stored
-    report/…                  parameters and curves as the report shows them, after a person's changes; the
-                              signed report in force, with its PDF where one was made
+    config.json               settings that differ from the defaults
+    results/…                 result files as stored
+    report/…                  parameters and curves of the report, including edits; the signed report
+                              in force, with its PDF if available
 
 Uploaded to another Sagittal, or given to `sagittal analyse`, the recording is read with that manifest and
 those settings, so the same version gives the same numbers.
@@ -39,7 +39,7 @@ def write_archive(
     out: IO[bytes],
     blobs: BlobStore,
     recording: StoredRecording,
-    found: AnalysisRecord,
+    record: AnalysisRecord,
     edits: EditHistory,
     report: Mapping[str, bytes],
     signed: SignedDocuments | None,
@@ -48,12 +48,12 @@ def write_archive(
 
     Parameters
     ----------
-    recording : what was analysed. report : files of the report by name. signed : the version in force.
+    recording : the analysed recording. report : files of the report by name. signed : the version in force.
 
     Raises
     ------
     IntegrityError, ArchiveError
-        A stored file is damaged, or a zip that was uploaded.
+        A stored file or an uploaded zip is damaged.
     """
     from sagittal.core.formats.archive import EPISODE_CONFIG, EPISODE_MANIFEST, EPISODE_MARK  # slow import
 
@@ -68,39 +68,39 @@ def write_archive(
 
         for name, content in _originals(blobs, recording):
             add(name, content)
-        add(EPISODE_MANIFEST, _json(found.manifest or {}))
-        add(EPISODE_CONFIG, _json(_settings(blobs, recording, found)))
-        for name, blob in found.files.items():
-            add(f"results/{name}", blobs.read(found.patient_id, blob.sha256))
+        add(EPISODE_MANIFEST, _json(record.manifest or {}))
+        add(EPISODE_CONFIG, _json(_settings(blobs, recording, record)))
+        for name, blob in record.files.items():
+            add(f"results/{name}", blobs.read(record.patient_id, blob.sha256))
         for name, content in report.items():
             add(f"report/{name}", content)
         if signed is not None:
             for name, blob in signed.files.items():
-                add(f"report/{name}", blobs.read(found.patient_id, blob.sha256))
+                add(f"report/{name}", blobs.read(record.patient_id, blob.sha256))
         mark = {
             "schema": SCHEMA,
             "written_by": CODE_VERSION,
-            "analysed_by": found.code_version,
-            "analysed_at": found.created_at.isoformat(timespec="seconds"),
-            "config_sha256": found.config_sha256,
+            "analysed_by": record.code_version,
+            "analysed_at": record.created_at.isoformat(timespec="seconds"),
+            "config_sha256": record.config_sha256,
             "edits": [m.edit.to_json() for m in edits.made],
-            "signed_report": None if signed is None else signed.describe(found, edits),
+            "signed_report": None if signed is None else signed.describe(record, edits),
             "sha256": dict(sha256),
         }
         add(EPISODE_MARK, _json(mark))
 
 
-def _settings(blobs: BlobStore, recording: StoredRecording, found: AnalysisRecord) -> Mapping[str, Any]:
-    """What the analysis was computed with, also where it came in an archive among the recording's files."""
+def _settings(blobs: BlobStore, recording: StoredRecording, record: AnalysisRecord) -> Mapping[str, Any]:
+    """Settings of the analysis, including those of an archive among the recording's files."""
     from sagittal.server.results.analysing import choose_config  # slow imports
     from sagittal.server.storage.files.blob_source import open_source
 
     files = [open_source(blobs, recording.patient_id, f.name, f.size, f.sha256) for f in recording.files]
-    return choose_config(files, found.config)
+    return choose_config(files, record.config)
 
 
 def _originals(blobs: BlobStore, recording: StoredRecording) -> Iterator[tuple[str, bytes]]:
-    """The recording's files one after another, taken out of the zips and gz they came in."""
+    """Iterate over the recording's files, unpacked from zip and gz."""
     from sagittal.core.formats.archive import EPISODE_RECORDING, expand  # slow import
     from sagittal.core.formats.source import SourceFile
 

@@ -1,11 +1,11 @@
-"""Results for research that lead back to nobody without a key: one zip over any number of patients.
+"""De-identified results for research: one zip for any number of patients; re-identification needs the key.
 
-    for piece in export_deidentified(db, blobs, key, chosen): ...        # in pieces, whatever the size
+    for piece in export_deidentified(db, blobs, key, chosen): ...        # streamed
 
 Pseudonyms and the shift of days are HMAC-SHA256 (RFC 2104) of the ids under the clinic's key: the same key
-gives the same ones again, so a later export goes on from an earlier one, and nobody without it can try ids.
-Days of a person are all shifted by the same number of days, so intervals stay; ages from 89 are 89. Of texts
-only codes of our own go out (docs/reference/exports.md, "For research").
+reproduces them, so later exports match earlier ones, and without it ids cannot be tested. All dates of a
+patient are shifted by the same number of days, which preserves intervals; ages above 89 are given as 89. Free
+text is omitted except for our own codes (docs/reference/exports.md, "For research").
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ _CODED: Final = frozenset({"reason", "note", "excluded_reason", "source"})
 
 @dataclass(frozen=True)
 class ResearchKey:
-    """What leads from patients to pseudonyms; it stays in the clinic.
+    """Key that maps patients to pseudonyms; it remains in the clinic.
 
     Parameters
     ----------
@@ -75,16 +75,16 @@ class ResearchKey:
         return self._digest("visit", session_id).hex()[:16]
 
     def shift(self, patient_id: str, day: dt.date) -> dt.date:
-        """A day of a patient moved back by this patient's 1 to 1461 days."""
+        """Shift a date of a patient back by the patient's offset of 1 to 1461 days."""
         drawn = int.from_bytes(self._digest("days", patient_id)[:8], "big")
         return day - dt.timedelta(days=1 + drawn % MOST_SHIFT_DAYS)
 
-    def _digest(self, what: str, identity: str) -> bytes:
-        return hmac.digest(self.secret, f"{what}:{identity}".encode(), "sha256")
+    def _digest(self, value: str, identity: str) -> bytes:
+        return hmac.digest(self.secret, f"{value}:{identity}".encode(), "sha256")
 
 
 def open_key(path: Path) -> ResearchKey:
-    """Read a key, or make one where there is no file; raises InputError `bad_research_key`, OSError."""
+    """Read a key, or create one if the file does not exist; raises InputError `bad_research_key`, OSError."""
     if not path.exists():
         fs.write_file(path.absolute(), f"{secrets.token_hex(32)}\n".encode())
     text = path.read_bytes().strip().decode("ascii", "replace")
@@ -96,7 +96,7 @@ def open_key(path: Path) -> ResearchKey:
 
 
 def list_chosen(c: Connection, codes: Sequence[str]) -> list[Patient]:
-    """Patients by their codes, all where none is given; raises NotFound for a code that nobody has."""
+    """Patients by code, all if none is given; raises NotFound for an unknown code."""
     everybody = {p.code: p for p in patients.list_patients(c, None, limit=patients.count(c, None))}
     for code in codes:
         if code not in everybody:
@@ -105,14 +105,14 @@ def list_chosen(c: Connection, codes: Sequence[str]) -> list[Patient]:
 
 
 def has_agreed(c: Connection, patient_id: str) -> bool:
-    """Whether a consent to research is written down and was not withdrawn."""
+    """Whether a consent to research is recorded and not withdrawn."""
     return any(
         one.purpose == "research" and one.withdrawn_on is None for one in consents.of_patient(c, patient_id)
     )
 
 
 def find_person(c: Connection, key: ResearchKey, pseudonym: str) -> Patient | None:
-    """The patient behind a pseudonym of this key, None = it is of another key or was erased."""
+    """The patient with a pseudonym of this key, None if it belongs to another key or was erased."""
     return next((p for p in list_chosen(c, ()) if key.name_person(p.id) == pseudonym), None)
 
 
@@ -124,7 +124,9 @@ def export_deidentified(
     *,
     with_signals: bool = False,
 ) -> Iterator[bytes]:
-    """The zip in pieces; a visit without an analysis, or with damaged files, is named in `left_out.csv`."""
+    """Yield the zip in parts; visits without an analysis or with damaged files are listed in
+    `left_out.csv`.
+    """
     sink = ZipSink()
     tables: dict[str, list[Row]] = {"persons": [], "visits": [], "left_out": []}
     headers: dict[str, tuple[str, ...]] = {
@@ -168,8 +170,8 @@ def export_deidentified(
 
 def _open(db: Database, blobs: BlobStore, key: ResearchKey, person: Patient, visit: Session) -> ExportContent:
     with db.read() as c:
-        found = analyses.get_shown(c, visit.id)
-        edits = edit_log.edits_of(c, found.id).edits
+        record = analyses.get_shown(c, visit.id)
+        edits = edit_log.edits_of(c, record.id).edits
     facts = VisitFacts(
         subject=key.name_person(person.id),
         visit=key.name_visit(visit.id),
@@ -179,7 +181,7 @@ def _open(db: Database, blobs: BlobStore, key: ResearchKey, person: Patient, vis
         height_m=person.find_height(visit),
         version=CODE_VERSION,
     )
-    readers = {name: partial(analyses.file_bytes, blobs, found, name) for name in found.files}
+    readers = {name: partial(analyses.file_bytes, blobs, record, name) for name in record.files}
     return open_content(readers, facts, edits)
 
 
@@ -193,7 +195,7 @@ def _describe(facts: VisitFacts, visit: Session) -> Row:
 
 
 def _list_sheets(content: ExportContent) -> dict[str, TableSheet]:
-    """The tables of a visit by the names of their files, the same columns for every visit."""
+    """Tables of a visit by file name, with the same columns for every visit."""
     v = content.visit
     curves = sheets.list_curves(content)
     long = tuple(
@@ -227,7 +229,7 @@ def _keep_codes(sheet: TableSheet) -> TableSheet:
 
 
 def _strip_signals(content: ExportContent) -> bytes:
-    """What the sensors measured by where they were worn, from 0 s on, without their serial numbers."""
+    """Sensor signals by segment, starting at 0 s and without serial numbers."""
     table, meta = content.signals
     t_s = floats_of(table, "t_s")
     columns = {name: table.column(name).combine_chunks() for name in table.column_names if name != "t_s"}

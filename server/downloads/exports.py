@@ -1,6 +1,6 @@
-"""Exports of an analysis for other programs: offered, asked for, written in the child, published.
+"""Exports of an analysis for other programs: offer, request, write in the child process, publish.
 
-The file of an export is a file of its analysis, named by the job; so it lives and goes with it.
+An export is stored as a file of its analysis, named by the job, and is deleted with it.
 """
 
 from __future__ import annotations
@@ -43,12 +43,13 @@ MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCU
 
 @dataclass(frozen=True)
 class ExportOffer:
-    """A format that the shown analysis can be written in, as it counts now.
+    """A format in which the displayed analysis can be exported, in its current state.
 
     Parameters
     ----------
-    kind : its name. label, what : in words. job : that writes it, None = not asked for since the last change.
-    analysis_id, file : where it can be downloaded, file None until it is written.
+    kind : name. label, what : title and description. job : the export job, None = not requested since the
+        last change.
+    analysis_id, file : location for the download, file None until it is written.
     """
 
     kind: str
@@ -60,62 +61,62 @@ class ExportOffer:
 
 
 def list_offers(
-    c: Connection, patient: Patient, session: Session, found: analyses.AnalysisRecord
+    c: Connection, patient: Patient, session: Session, record: analyses.AnalysisRecord
 ) -> list[ExportOffer]:
-    """Every format that an analysis of a session can be written in, and how far it is.
+    """All formats in which an analysis of a session can be exported, and their progress.
 
-    What was written before the last edit, or before person or visit were corrected, is offered anew; what
-    hands on the signed report also after it was signed, reopened or printed.
+    An export is offered again after an edit or a correction of patient or visit; formats that contain the
+    signed report also after it was signed, reopened or printed.
     """
-    possible = kinds.list_possible(found.files)
-    params = _collect_params(c, patient, session, found, possible)
-    keys = {name: make_key(found, EXPORT, own) for name, own in params.items()}
+    possible = kinds.list_possible(record.files)
+    params = _collect_params(c, patient, session, record, possible)
+    keys = {name: make_key(record, EXPORT, own) for name, own in params.items()}
     query = select(*VIEW_COLUMNS, job.c.key).where(job.c.key.in_(keys.values())).order_by(job.c.seq)
     rows: list[Any] = list(c.execute(query))
     newest = {row.key: job_view(row) for row in rows}
-    return [_offer(found, kind, newest.get(keys[kind.name])) for kind in possible]
+    return [_offer(record, kind, newest.get(keys[kind.name])) for kind in possible]
 
 
-def _offer(found: analyses.AnalysisRecord, kind: ExportKind, made: JobView | None) -> ExportOffer:
-    name = None if made is None else name_file(kind, made.id)
+def _offer(record: analyses.AnalysisRecord, kind: ExportKind, view: JobView | None) -> ExportOffer:
+    name = None if view is None else name_file(kind, view.id)
     return ExportOffer(
-        kind.name, kind.label, kind.what, made, found.id, name if name in found.files else None
+        kind.name, kind.label, kind.what, view, record.id, name if name in record.files else None
     )
 
 
 def submit(
     c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str, *, kind: str
 ) -> JobView:
-    """Ask for an export of the analysis that the session shows, with the edits that count; done once.
+    """Request an export of the session's displayed analysis with the current edits; idempotent.
 
     Raises
     ------
     NotFound
-        the session, its analysis. InputError unknown_export. Conflict export_not_possible.
+        the session or its analysis. InputError unknown_export. Conflict export_not_possible.
     """
     chosen = kinds.find_kind(kind)
-    found = analyses.get_shown(c, session_id)
-    if chosen not in kinds.list_possible(found.files):
-        lacking = ", ".join(name for name in chosen.needs if name not in found.files)
+    record = analyses.get_shown(c, session_id)
+    if chosen not in kinds.list_possible(record.files):
+        lacking = ", ".join(name for name in chosen.needs if name not in record.files)
         raise Conflict(
             "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
         )
-    session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
-    params = _collect_params(c, patient, session, found, [chosen])
-    return submit_for(c, queue, actor, found, EXPORT, "export.requested", params[kind])
+    session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
+    params = _collect_params(c, patient, session, record, [chosen])
+    return submit_for(c, queue, actor, record, EXPORT, "export.requested", params[kind])
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Write an export; pure, and too short to say how far it is.
+    """Write an export; pure, and too short for progress reports.
 
     Parameters
     ----------
-    files : result files of the analysis, and documents of the signed report where the format hands it on.
+    files : result files of the analysis, and documents of the signed report if the format includes it.
 
     Raises
     ------
     SagittalError
-        it cannot be written; the code and the sentence say why.
+        it cannot be written; code and message give the reason.
     """
     readers = {file.name: file.read for file in files if not file.name.startswith(SIGNED)}
     edits = [read_edit(e) for e in params["edits"]]
@@ -126,47 +127,47 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the file of a result, in the transaction that marks its job done."""
+    """Store the file of a result, in the transaction that marks its job done."""
     for kind, blob in stored.items():
         name = name_file(kinds.find_kind(kind), claim.job_id)
         row = {"name": name, "size": blob.size, "sha256": blob.sha256}
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
-def _read_signed(files: Sequence[SourceFile], told: Mapping[str, Any]) -> SignedForm:
-    """The signed report of a job, as `_collect_params` has given it."""
+def _read_signed(files: Sequence[SourceFile], report: Mapping[str, Any]) -> SignedForm:
+    """The signed report of a job, as specified by `_collect_params`."""
     readers = {file.name: file.read for file in files}
     documents = tuple(
         (media_type, readers[SIGNED + name]())
         for name, media_type in MEDIA_TYPES.items()
         if SIGNED + name in readers
     )
-    known = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
-    return SignedForm(**{name: told[name] for name in known}, documents=documents)
+    fields = ("version", "language", "signed_by", "signed_at", "of_these_numbers")
+    return SignedForm(**{name: report[name] for name in fields}, documents=documents)
 
 
 def _collect_params(
     c: Connection,
     patient: Patient,
     session: Session,
-    found: analyses.AnalysisRecord,
-    wanted: Sequence[ExportKind],
+    record: analyses.AnalysisRecord,
+    formats: Sequence[ExportKind],
 ) -> dict[str, dict[str, Any]]:
-    """What each format is written from, fixed at submission, by its name."""
-    edits = edit_log.edits_of(c, found.id)
+    """Job parameters of each format by name, fixed at submission."""
+    edits = edit_log.edits_of(c, record.id)
     shared: dict[str, Any] = {
-        "space": found.patient_id,
+        "space": record.patient_id,
         "files": [
             {"name": name, "size": blob.size, "sha256": blob.sha256}
-            for name, blob in found.files.items()
+            for name, blob in record.files.items()
             if not name.startswith(EXPORTED)
         ],
-        "analysis_id": found.id,
+        "analysis_id": record.id,
         "edits": [e.to_json() for e in edits.edits],
-        "visit": asdict(_describe_visit(patient, AnalysedSession(session, found, edits))),
+        "visit": asdict(_describe_visit(patient, AnalysedSession(session, record, edits))),
     }
-    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in wanted}
-    handed_on = [kind.name for kind in wanted if kind.hands_on_signed]
+    params: dict[str, dict[str, Any]] = {kind.name: {**shared, "kind": kind.name} for kind in formats}
+    handed_on = [kind.name for kind in formats if kind.hands_on_signed]
     signed = signed_reports.find_documents(c, session.id) if handed_on else None
     if signed is not None:
         documents = [
@@ -176,7 +177,7 @@ def _collect_params(
         for name in handed_on:
             params[name] |= {
                 "files": shared["files"] + documents,
-                "signed": signed.describe(found, edits),
+                "signed": signed.describe(record, edits),
             }
     return params
 
@@ -199,5 +200,5 @@ def _describe_visit(patient: Patient, analysed: AnalysedSession) -> VisitFacts:
 
 
 def make_pseudonym(identity: str) -> str:
-    """A stable name that leads back to nobody without the database: 12 hex digits."""
+    """Stable pseudonym that cannot be resolved without the database: 12 hex digits."""
     return hashlib.sha256(identity.encode()).hexdigest()[:12]

@@ -1,11 +1,11 @@
-"""Everything that is stored of one patient as one zip, for the person or for another clinic.
+"""All stored data of one patient as one zip, for the patient or another clinic.
 
-    for piece in export_patient(db, blobs, patient_id, key_file): ...        # in pieces, whatever the size
+    for piece in export_patient(db, blobs, patient_id, key_file): ...        # streamed
 
-`patient.json` has every row that belongs to the patient, by table, with the names of who wrote it; who the
-patient is stands there in clear for who may read that, else not at all.
-`audit.json` who opened or changed what of it, `files/<table>/<id>/<name>` the files, recordings as uploaded.
-What belongs to a patient is found by the references of the tables, so a new table is in it by itself.
+`patient.json` has every row that belongs to the patient, by table, with the authors' names; the identity is
+included in clear text if the user may read it, otherwise omitted. `audit.json` lists access and changes,
+`files/<table>/<id>/<name>` are the files, recordings as uploaded. Rows of a patient are found through foreign
+keys, so new tables are included automatically.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ class ExportedFile:
 
 
 def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]:
-    """Every row that belongs to a patient, by table; raises NotFound."""
+    """All rows that belong to a patient, by table; raises NotFound."""
     patients.get(c, patient_id)
-    found: dict[str, dict[tuple[object, ...], dict[str, Any]]] = {}
+    rows_by_table: dict[str, dict[tuple[object, ...], dict[str, Any]]] = {}
     ids: dict[str, set[str]] = {patient.name: {patient_id}}
-    _keep(c, patient, patient.c.id == patient_id, found, ids)
+    _keep(c, patient, patient.c.id == patient_id, rows_by_table, ids)
     grows = True
     while grows:
         grows = False
@@ -59,43 +59,43 @@ def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]
             keys = [key for key in table.foreign_keys if key.column.table.name in ids.keys() - {user.name}]
             if keys and table.name != _ENCRYPTED:
                 mine = or_(*(key.parent.in_(ids[key.column.table.name]) for key in keys))
-                grows = _keep(c, table, mine, found, ids) or grows
-    return {name: list(rows.values()) for name, rows in sorted(found.items())}
+                grows = _keep(c, table, mine, rows_by_table, ids) or grows
+    return {name: list(rows.values()) for name, rows in sorted(rows_by_table.items())}
 
 
 def list_files(rows: dict[str, list[dict[str, Any]]]) -> list[ExportedFile]:
-    """The files that rows refer to; their names were checked when they came (receiving.check_name)."""
-    found = {}
+    """Files referenced by rows; their names were validated on upload (receiving.check_name)."""
+    files = {}
     for table, its_rows in rows.items():
         for row in its_rows:
             for name, sha256 in (("name", "sha256"), ("reference_name", "reference_sha256")):
                 if row.get(name) and row.get(sha256):
                     owner = next(str(value) for key, value in row.items() if key.endswith("id"))
                     path = f"files/{table}/{owner}/{row[name]}"
-                    found[path] = ExportedFile(path, row[sha256])
-    return list(found.values())
+                    files[path] = ExportedFile(path, row[sha256])
+    return list(files.values())
 
 
 def export_patient(
     db: Database, blobs: BlobStore, patient_id: str, identity_key: Path | None = None
 ) -> Iterator[bytes]:
-    """The zip in pieces; what is gone or damaged is named in `missing.json` instead.
+    """Yield the zip in parts; missing or damaged files are listed in `missing.json` instead.
 
     Parameters
     ----------
-    identity_key : file with the key of patients' names; None = who asks may not read them.
+    identity_key : file with the key of identities; None = the user may not read identities.
     """
     missing = []
     with db.read() as c:
         rows = list_rows(c, patient_id)
         if identity_key is not None and identities.are_kept(c, identity_key):
             try:
-                who = identities.get(c, identity_key, patient_id)
+                identity = identities.get(c, identity_key, patient_id)
             except (KeyUnusable, ValueUnreadable) as error:
                 missing.append({"name": _ENCRYPTED, "why": error.message})
             else:
-                if who.changed_at is not None:
-                    rows[_ENCRYPTED] = [{k: _plain(v) for k, v in vars(who).items()}]
+                if identity.changed_at is not None:
+                    rows[_ENCRYPTED] = [{k: _plain(v) for k, v in vars(identity).items()}]
         ids = [row["id"] for its_rows in rows.values() for row in its_rows if "id" in row]
         trail = c.execute(select(audit).where(audit.c.resource_id.in_(ids)).order_by(audit.c.seq)).all()
         people = c.execute(select(user.c.id, user.c.name)).all()
@@ -138,20 +138,20 @@ def _keep(
     c: Connection,
     table: Table,
     mine: Any,
-    found: dict[str, dict[tuple[object, ...], dict[str, Any]]],
+    tables: dict[str, dict[tuple[object, ...], dict[str, Any]]],
     ids: dict[str, set[str]],
 ) -> bool:
-    """Add the rows of a table to those found; whether there are new ones."""
-    known = found.setdefault(table.name, {})
-    before = len(known)
+    """Add rows of a table to the result; return whether any are new."""
+    rows = tables.setdefault(table.name, {})
+    count = len(rows)
     for row in c.execute(select(table).where(mine)):
         values = {name: _plain(value) for name, value in row._asdict().items() if name not in SECRET}
-        known[tuple(getattr(row, column.name) for column in table.primary_key)] = values
+        rows[tuple(getattr(row, column.name) for column in table.primary_key)] = values
         if "id" in values:
             ids.setdefault(table.name, set()).add(str(values["id"]))
-    if not known:
-        del found[table.name]
-    return len(known) > before
+    if not rows:
+        del tables[table.name]
+    return len(rows) > count
 
 
 def _plain(value: object) -> object:

@@ -1,8 +1,8 @@
-"""The visits of a study as two tables: which ones are chosen, and their analyses as they count.
+"""Studies: the selected visits and their current analyses as two tables.
 
-Nothing is analysed anew and nothing is kept: the tables are made of the stored analyses with the persons'
-edits, in a process of their own (study_child.py). Persons and visits stand in them by pseudonyms, those of
-the other exports; no date, no note.
+Nothing is recomputed or stored: the tables are built from stored analyses and users' edits, in a separate
+process (study_child.py). Patients and visits are identified by the pseudonyms of the other exports; dates and
+notes are omitted.
 """
 
 from __future__ import annotations
@@ -42,12 +42,12 @@ MOST_VISITS: Final = 300
 
 @dataclass(frozen=True)
 class StudyChoice:
-    """Which visits are wanted.
+    """Selection of visits.
 
     Parameters
     ----------
-    search : part of a patient's code or note. protocol : None = any. since, until : days, both included.
-    visits : only these of them; None = all.
+    search : part of a patient's code or note. protocol : None = any. since, until : dates, inclusive. visits
+        : restrict to these; None = all.
     """
 
     search: str = ""
@@ -57,13 +57,13 @@ class StudyChoice:
     visits: frozenset[str] | None = None
 
 
-def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Session]:
-    """The visits of a choice that a person may open, by patient and day."""
+def list_visits(c: Connection, user: Identity, choice: StudyChoice) -> list[Session]:
+    """Selected visits that a user may open, by patient and date."""
     if choice.visits is not None and not choice.visits:
         return []
     return sessions.search(
         c,
-        who,
+        user,
         search=choice.search,
         protocol=choice.protocol,
         since=choice.since,
@@ -73,7 +73,7 @@ def list_visits(c: Connection, who: Identity, choice: StudyChoice) -> list[Sessi
 
 
 def check_size(chosen: Sequence[Session]) -> None:
-    """Refuse a study of no visit or of too many; raises Conflict no_visits, too_many_visits."""
+    """Reject a study with no visits or too many; raises Conflict no_visits, too_many_visits."""
     if not chosen:
         raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
     if len(chosen) > MOST_VISITS:
@@ -85,9 +85,9 @@ def check_size(chosen: Sequence[Session]) -> None:
 
 
 def make_study(
-    db: Database, reviewed: ReviewedAnalyses, who: Identity, choice: StudyChoice
+    db: Database, reviewed: ReviewedAnalyses, user: Identity, choice: StudyChoice
 ) -> tuple[StudyTables, list[str]]:
-    """Write the tables of a choice, and say which visits are in them.
+    """Write the tables of a selection and list the visits they contain.
 
     Raises
     ------
@@ -95,25 +95,25 @@ def make_study(
         no_visits, too_many_visits.
     """
     with db.read() as c:
-        chosen = list_visits(c, who, choice)
+        chosen = list_visits(c, user, choice)
         check_size(chosen)
         people = {p: patients.get(c, p) for p in dict.fromkeys(s.patient_id for s in chosen)}
-        shown = analyses.latest_of(c, [s.id for s in chosen])
-        edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
-        recorded = {s: recordings.get(c, found.recording_id) for s, found in shown.items()}
+        records = analyses.latest_of(c, [s.id for s in chosen])
+        edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
+        recorded = {s: recordings.get(c, record.recording_id) for s, record in records.items()}
     first: dict[str, dt.date] = {}
     for s in chosen:
         first[s.patient_id] = min(s.performed_on, first.get(s.patient_id, s.performed_on))
     takes = []
     for s in chosen:
         person, name = people[s.patient_id], _name(s)
-        found = shown.get(s.id)
+        record = records.get(s.id)
         labels = _label(person, s, first[s.patient_id])
-        if found is None:
+        if record is None:
             lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse it, or leave it out.")
             takes.append(StudyTake(name, labels, 0, {}, lacking, dict, lambda: None))
         else:
-            done = AnalysedSession(s, found, edits[found.id])
+            done = AnalysedSession(s, record, edits[record.id])
             labels |= {"condition": done.condition.words, "edits": len(done.edits.made)}
             files = {f.name: f.sha256 for f in recorded[s.id].files}
             takes.append(_open_take(reviewed, name, labels, files, done))
@@ -121,9 +121,9 @@ def make_study(
         "written_by": CODE_VERSION,
         "written_at": now().isoformat(timespec="seconds"),
         "analyses": {
-            _name(s): {"analysed_by": found.code_version, "config": dict(found.config)}
+            _name(s): {"analysed_by": record.code_version, "config": dict(record.config)}
             for s in chosen
-            if (found := shown.get(s.id)) is not None
+            if (record := records.get(s.id)) is not None
         },
     }
     return write_study(takes, about), [s.id for s in chosen]
@@ -136,18 +136,18 @@ def _open_take(
     files: Mapping[str, str],
     done: AnalysedSession,
 ) -> StudyTake:
-    """The result of a visit as it counts; what cannot be read is told, and the others go on."""
-    found, edits = done.found, done.edits
+    """Current result of a visit; an unreadable one is reported, without affecting the others."""
+    record, edits = done.found, done.edits
     error, strides, analysis = None, None, {}
     try:
-        analysis = json.loads(analyses.file_bytes(reviewed.blobs, found, "analysis.json"))
-        result = reviewed.measure(found, edits)
+        analysis = json.loads(analyses.file_bytes(reviewed.blobs, record, "analysis.json"))
+        result = reviewed.measure(record, edits)
         if result is not None:
             strides = strides_csv(result.strides, result.columns)
-            bundle = reviewed.read_bundle(found, edits)
+            bundle = reviewed.read_bundle(record, edits)
             analysis["parameters"] = [parameter_row(p) for p in bundle.parameters]
-        elif "strides.csv" in found.files:
-            strides = analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+        elif "strides.csv" in record.files:
+            strides = analyses.file_bytes(reviewed.blobs, record, "strides.csv")
     except StoreAway:
         raise  # it is not this visit that cannot be read
     except SagittalError as refused:
@@ -156,7 +156,7 @@ def _open_take(
 
 
 def _hide_names(files: Mapping[str, str]) -> dict[str, str]:
-    """Hashes by number: a file may be called after a person."""
+    """Replace file names in hashes by numbers, as files may be named after patients."""
     return {f"file-{number}": sha256 for number, sha256 in enumerate(files.values(), 1)}
 
 

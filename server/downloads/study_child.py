@@ -1,8 +1,7 @@
-"""The process that makes the tables of one study and ends: reading hundreds of results stops nobody.
+"""Process that builds the tables of one study, so that reading hundreds of results does not block the server.
 
-Started by server/downloads/study_maker.py as
-`python -m sagittal.server.downloads.study_child <socket> <parent pid>`. It reads the database and
-writes nothing.
+Started by server/downloads/study_maker.py as `python -m sagittal.server.downloads.study_child <socket>
+<parent pid>`. It reads the database and writes nothing.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from contextlib import closing
 import msgspec
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.downloads.studies import StudyChoice, make_study
 from sagittal.server.export.zipping import zip_files
@@ -21,11 +21,10 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blob_opening import open_blobs
-from sagittal.web.user_text import encode_user_text
 
 
 class StudyReply(msgspec.Struct, frozen=True):
-    """The tables of a study in a zip and the visits in them, or why there is none."""
+    """Tables of a study in a zip and its visits, or the reason of failure."""
 
     content: bytes = b""
     visits: tuple[str, ...] = ()
@@ -34,7 +33,7 @@ class StudyReply(msgspec.Struct, frozen=True):
 
 
 def main() -> None:
-    """Make the tables of the one choice that comes over the line."""
+    """Build the tables of the one request received over the channel."""
     line, settings = enter_child()
     try:
         reply = _make(settings, *msgspec.msgpack.decode(line.receive(), type=tuple[Identity, StudyChoice]))
@@ -46,9 +45,9 @@ def main() -> None:
     line.send(msgspec.msgpack.encode(reply, enc_hook=encode_user_text))
 
 
-def _make(settings: Settings, who: Identity, choice: StudyChoice) -> StudyReply:
+def _make(settings: Settings, user: Identity, choice: StudyChoice) -> StudyReply:
     with closing(Database(settings.database_source)) as db:
-        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), who, choice)
+        tables, visits = make_study(db, ReviewedAnalyses(open_blobs(settings)), user, choice)
     return StudyReply(zip_files(tables.files), tuple(visits))
 
 

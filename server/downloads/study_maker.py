@@ -1,4 +1,4 @@
-"""Studies as a download: each made by a process of its own, one at a time."""
+"""Study downloads: each is built by its own process, one at a time."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Final
 
 import msgspec
 
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.downloads.studies import StudyChoice, check_size, list_visits
 from sagittal.server.downloads.study_child import StudyReply
@@ -14,7 +15,6 @@ from sagittal.server.processes.child import FAR_BEHIND
 from sagittal.server.processes.errand import ErrandTurn, TooManyErrands, run_errand
 from sagittal.server.settings import Settings
 from sagittal.server.storage.db import Database
-from sagittal.web.user_text import encode_user_text
 
 CHILD: Final = "sagittal.server.downloads.study_child"
 LONGEST_S: Final = 300.0
@@ -24,24 +24,24 @@ _turn = ErrandTurn()
 
 
 class StudyFailed(ServiceError):  # noqa: N818 - says what failed
-    """No tables could be made."""
+    """The tables could not be created."""
 
     status = 503
 
 
 def fetch_study(
-    db: Database, settings: Settings, who: Identity, choice: StudyChoice
+    db: Database, settings: Settings, user: Identity, choice: StudyChoice
 ) -> tuple[bytes, tuple[str, ...]]:
-    """The tables of a choice as a zip, and which visits are in them.
+    """Tables of a selection as a zip, and the visits they contain.
 
     Raises
     ------
     Conflict
-        no_visits, too_many_visits. StudyFailed: others wait, it took too long, or ended without a word.
+        no_visits, too_many_visits. StudyFailed: the queue is full, it timed out, or the process died.
     """
     with db.read() as c:
-        check_size(list_visits(c, who, choice))
-    order = msgspec.msgpack.encode((who, choice), enc_hook=encode_user_text)
+        check_size(list_visits(c, user, choice))
+    order = msgspec.msgpack.encode((user, choice), enc_hook=encode_user_text)
     try:
         with _turn.take():
             answer = run_errand(CHILD, settings, order, LONGEST_S, FAR_BEHIND)

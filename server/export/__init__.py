@@ -1,2 +1,3 @@
-"""Finished analyses as files for other programs (docs/reference/exports.md). Written in the worker, never in
-the web process; what each format needs and is called stands in `sagittal.server.export.kinds`."""
+"""Export of finished analyses to other programs (docs/reference/exports.md). Written in the worker, not in
+the web process; for the formats see `sagittal.server.export.kinds`.
+"""

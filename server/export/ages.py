@@ -1,4 +1,4 @@
-"""Which ages leave the clinic beside a pseudonym."""
+"""Coarsening of ages in pseudonymized exports."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ OLDEST: Final = 89
 
 
 def coarsen_age(age: int | None) -> int | None:
-    """The age in years, at most that of the oldest who are told apart from others; None = not known."""
+    """Age in years, capped at the oldest age exported; None = unknown."""
     return None if age is None else min(age, OLDEST)

@@ -1,7 +1,7 @@
-"""A BIDS-motion data set of one visit: what the sensors measured, contacts, strides.
+"""BIDS-motion data set of one visit: sensor signals, contacts, strides.
 
-Layout and columns: Brain Imaging Data Structure 1.9, "Motion" (doi:10.1038/s41597-024-03559-8). Nothing in it
-leads to a person: pseudonyms, no dates, ages of 89 and more as 89+.
+Layout and columns: Brain Imaging Data Structure 1.9, "Motion" (doi:10.1038/s41597-024-03559-8). Free of
+identifying data: pseudonyms, no dates, ages of 89 and above as 89+.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ KINDS: Final = (("acc", "", "ACCEL", "m/s^2", 1.0), ("gyr", "_dps", "GYRO", "rad
 def write_bids(content: ExportContent) -> bytes:
     """Write a zip with the data set; raises FormatError `export_not_possible`."""
     table, meta = content.signals
-    worn = [s for s in SEGMENTS if f"{s}_acc_x" in table.column_names]
+    segments = [s for s in SEGMENTS if f"{s}_acc_x" in table.column_names]
     subject, visit = f"sub-{_label(content.visit.subject)}", f"ses-{_label(content.visit.visit)}"
     task = _label(content.visit.protocol.title())
     stem = f"{subject}/{visit}/motion/{subject}_{visit}_task-{task}"
     tracked = f"{stem}_tracksys-{TRACKSYS}"
     channels: list[Sequence[object]] = []
     columns = []
-    for segment in worn:
+    for segment in segments:
         for name, ending, kind, unit, factor in KINDS:
             for axis in "xyz":
                 column = floats_of(table, f"{segment}_{name}_{axis}{ending}")
@@ -65,10 +65,10 @@ def write_bids(content: ExportContent) -> bytes:
         "participants.json": _json(PARTICIPANTS),
         f"{tracked}_motion.tsv": motion.encode(),
         f"{tracked}_motion.json": _json(
-            _describe_motion(content, task, meta["rate_hz"], worn, table.num_rows)
+            _describe_motion(content, task, meta["rate_hz"], segments, table.num_rows)
         ),
         f"{tracked}_channels.tsv": _tsv(CHANNELS, channels),
-        f"{tracked}_channels.json": _json({"reference_frame": {"Levels": _describe_frames(worn)}}),
+        f"{tracked}_channels.json": _json({"reference_frame": {"Levels": _describe_frames(segments)}}),
         f"{stem}_events.tsv": _list_events(content),
         f"{stem}_events.json": _json(EVENTS),
     }
@@ -124,10 +124,10 @@ def _describe_person(content: ExportContent, subject: str) -> bytes:
 
 
 def _describe_motion(
-    content: ExportContent, task: str, rate_hz: float, worn: Sequence[Segment], samples: int
+    content: ExportContent, task: str, rate_hz: float, segments: Sequence[Segment], samples: int
 ) -> dict[str, Any]:
-    each = 3 * len(worn)
-    others = ("ANGACCEL", "JNTANG", "LATENCY", "MAGN", "MISC", "ORNT", "POS", "VEL")
+    each = 3 * len(segments)
+    channel_types = ("ANGACCEL", "JNTANG", "LATENCY", "MAGN", "MISC", "ORNT", "POS", "VEL")
     return {
         "TaskName": task,
         "TaskDescription": f"{content.visit.protocol}: {content.visit.condition}".rstrip(": "),
@@ -138,14 +138,14 @@ def _describe_motion(
         "RecordingDuration": samples / rate_hz,
         "MissingValues": "n/a",
         "MotionChannelCount": 2 * each,
-        "TrackedPointsCount": len(worn),
+        "TrackedPointsCount": len(segments),
         "ACCELChannelCount": each,
         "GYROChannelCount": each,
-        **{f"{kind}ChannelCount": 0 for kind in others},
+        **{f"{kind}ChannelCount": 0 for kind in channel_types},
     }
 
 
-def _describe_frames(worn: Sequence[Segment]) -> dict[str, Any]:
+def _describe_frames(segments: Sequence[Segment]) -> dict[str, Any]:
     return {
         f"sensor_{segment}": {
             "SpatialAxes": "n/a",
@@ -153,7 +153,7 @@ def _describe_frames(worn: Sequence[Segment]) -> dict[str, Any]:
             "RotationRule": "right-hand",
             "Description": f"Axes x, y, z as the sensor on the {PLACES[segment]} prints them",
         }
-        for segment in worn
+        for segment in segments
     }
 
 
@@ -162,9 +162,9 @@ def _list_events(content: ExportContent) -> bytes:
     rows: list[Sequence[Any]] = [
         (e.time_s, 0.0, names[e.kind], e.side, e.source, None, None) for e in content.bundle.events.events
     ]
-    what = "stride" if content.bundle.repetitions is None else "squat"
+    cycle = "stride" if content.bundle.repetitions is None else "squat"
     rows += [
-        (c.start_s, c.end_s - c.start_s, what, c.side, None, int(c.excluded is None), c.excluded)
+        (c.start_s, c.end_s - c.start_s, cycle, c.side, None, int(c.excluded is None), c.excluded)
         for c in content.cycles
     ]
     rows.sort(key=lambda row: row[0])
@@ -172,7 +172,7 @@ def _list_events(content: ExportContent) -> bytes:
 
 
 def _label(text: str) -> str:
-    """Text as a label: letters and digits only."""
+    """Convert text to a label of letters and digits only."""
     return re.sub(r"[^A-Za-z0-9]", "", text) or "unknown"
 
 
@@ -182,7 +182,7 @@ def _tsv(header: Sequence[str], rows: Sequence[Sequence[object]]) -> bytes:
 
 
 def _cell(value: object) -> str:
-    """A cell: undefined is n/a, and a text has neither tabs nor line ends."""
+    """Format a cell: undefined is n/a, tabs and line breaks are removed."""
     if value is None or value == "":
         return "n/a"
     return _number(value) if isinstance(value, float) else re.sub(r"\s+", " ", str(value))

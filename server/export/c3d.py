@@ -1,6 +1,6 @@
-"""C3D: joint centres as markers, joint angles, contacts as events, by ezc3d (extra `c3d`).
+"""C3D export by ezc3d (extra `c3d`): joint centres as markers, joint angles, contacts as events.
 
-A C3D file counts frames in 16 bits and the entries of a list in 8; a long take is written in parts.
+C3D counts frames in 16 bits and list entries in 8, so long trials are split into several files.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ EVENT_NAMES: Final = {"ic": ("Foot Strike", 1), "tc": ("Foot Off", 2)}
 
 @dataclass(frozen=True, eq=False)
 class Trajectories:
-    """What a C3D file holds over time: label → (n, 3), NaN where not known."""
+    """Time series of a C3D file: label → (n, 3), NaN where unknown."""
 
     t_s: Floats
     rate_hz: float
@@ -51,7 +51,7 @@ class Trajectories:
 
 
 def write_c3d(content: ExportContent) -> bytes:
-    """Write a zip of walk.c3d, or of walk-1.c3d … of a take that is too long for one file.
+    """Write a zip of walk.c3d, or of walk-1.c3d … for a trial too long for one file.
 
     Raises
     ------
@@ -65,13 +65,13 @@ def write_c3d(content: ExportContent) -> bytes:
             "C3D files need the library ezc3d, which is not installed; the administrator can add it with "
             "pip install 'sagittal[c3d]'.",
         ) from error
-    found = collect_trajectories(content)
+    trajectories = collect_trajectories(content)
     events = content.bundle.events.events
-    parts = find_parts(len(found.t_s), found.t_s, events)
+    parts = find_parts(len(trajectories.t_s), trajectories.t_s, events)
     files = {}
     for i, (first, last) in enumerate(parts, start=1):
         name = "walk.c3d" if len(parts) == 1 else f"walk-{i}.c3d"
-        files[name] = _write_part(ezc3d.c3d(), content, found, first, last)
+        files[name] = _write_part(ezc3d.c3d(), content, trajectories, first, last)
     return zip_files(files)
 
 
@@ -96,22 +96,22 @@ def collect_trajectories(content: ExportContent) -> Trajectories:
 
 
 def _joints(angles: JointAngles) -> dict[str, Floats]:
-    found = {}
+    centres = {}
     for side in SIDES:
         for joint, parts in SIGNS.items():
             names = [f"{name}_{SUFFIX[side]}" for name, _, _ in parts]
             if all(name in angles.angles for name in names):
                 columns = [np.degrees(angles.angles[name]) for name in names]
-                found[f"{side[0].upper()}{joint.capitalize()}Angles"] = np.stack(columns, axis=1)
-    return found
+                centres[f"{side[0].upper()}{joint.capitalize()}Angles"] = np.stack(columns, axis=1)
+    return centres
 
 
 def _pelvis(angles: JointAngles) -> dict[str, Floats]:
-    """Tilt, side up, side forward: the latter is the heading in the world, as no walkway has a direction."""
-    given, heading = angles.angles, angles.headings.get("pelvis")
-    if "pelvis_tilt" not in given or heading is None:
+    """Tilt, upward obliquity and rotation; rotation is the heading in the world, without a walkway axis."""
+    by_name, heading = angles.angles, angles.headings.get("pelvis")
+    if "pelvis_tilt" not in by_name or heading is None:
         return {}
-    tilt, up = given["pelvis_tilt"], given["pelvis_obliquity"]
+    tilt, up = by_name["pelvis_tilt"], by_name["pelvis_obliquity"]
     return {
         "RPelvisAngles": np.degrees(np.stack((tilt, up, heading), axis=1)),
         "LPelvisAngles": np.degrees(np.stack((tilt, -up, -heading), axis=1)),
@@ -119,7 +119,7 @@ def _pelvis(angles: JointAngles) -> dict[str, Floats]:
 
 
 def find_parts(n: int, t_s: Floats, events: Sequence[GaitEvent]) -> list[tuple[int, int]]:
-    """Ranges of frames [first, last), as few as hold the limits, all but equally long."""
+    """Ranges of frames [first, last) of nearly equal length, as few as the limits allow."""
     times = np.array([e.time_s for e in events])
     count = max(1, ceil(n / FRAMES))
     while True:
@@ -131,29 +131,31 @@ def find_parts(n: int, t_s: Floats, events: Sequence[GaitEvent]) -> list[tuple[i
 
 
 def _lie_within(times: Floats, t_s: Floats, first: int, last: int) -> np.ndarray:
-    """Which times lie in a range of frames; the last one ends with the take."""
+    """Mask of the times within a range of frames; the last range extends to the end of the trial."""
     end = t_s[last] if last < len(t_s) else np.inf
     return np.asarray((times >= t_s[first]) & (times < end))
 
 
-def _write_part(file: Any, content: ExportContent, found: Trajectories, first: int, last: int) -> bytes:
-    columns = {**found.markers_mm, **found.angles_deg}
+def _write_part(
+    file: Any, content: ExportContent, trajectories: Trajectories, first: int, last: int
+) -> bytes:
+    columns = {**trajectories.markers_mm, **trajectories.angles_deg}
     points = np.full((4, len(columns), last - first), 1.0)
     for i, values in enumerate(columns.values()):
         points[:3, i] = values[first:last].T
-    file["parameters"]["POINT"]["RATE"]["value"] = [found.rate_hz]
+    file["parameters"]["POINT"]["RATE"]["value"] = [trajectories.rate_hz]
     file["parameters"]["POINT"]["UNITS"]["value"] = ["mm"]
     file["parameters"]["POINT"]["LABELS"]["value"] = list(columns)
     file["data"]["points"] = points
-    file.add_parameter("POINT", "ANGLES", list(found.angles_deg))
+    file.add_parameter("POINT", "ANGLES", list(trajectories.angles_deg))
     file.add_parameter("POINT", "ANGLE_UNITS", ["deg"])
     if content.estimated:
         file.add_parameter("SAGITTAL", "ESTIMATED", list(content.estimated))
-    start = float(found.t_s[first])
+    start = float(trajectories.t_s[first])
     events = content.bundle.events.events
-    own = _lie_within(np.array([e.time_s for e in events]), found.t_s, first, last)
+    own = _lie_within(np.array([e.time_s for e in events]), trajectories.t_s, first, last)
     _add_events(file, content, [e for e, mine in zip(events, own, strict=True) if mine], start)
-    began = _lie_within(np.array([c.start_s for c in content.cycles]), found.t_s, first, last)
+    began = _lie_within(np.array([c.start_s for c in content.cycles]), trajectories.t_s, first, last)
     _add_cycles(file, [c for c, mine in zip(content.cycles, began, strict=True) if mine], start)
     with tempfile.TemporaryDirectory(prefix="sagittal-c3d-") as folder:
         path = Path(folder) / "walk.c3d"
@@ -166,7 +168,7 @@ def _write_part(file: Any, content: ExportContent, found: Trajectories, first: i
 
 
 def _add_events(file: Any, content: ExportContent, events: Sequence[GaitEvent], start_s: float) -> None:
-    """The group that programs read contacts from: minutes and seconds from the file's first frame."""
+    """Add the standard event group: minutes and seconds from the file's first frame."""
     n = len(events)
     file.add_parameter("EVENT", "USED", [n])
     if not n:
@@ -184,7 +186,7 @@ def _add_events(file: Any, content: ExportContent, events: Sequence[GaitEvent], 
 
 
 def _add_cycles(file: Any, cycles: Sequence[CycleRow], start_s: float) -> None:
-    """A group of our own: where the file begins in the take, and which strides count."""
+    """Add a custom group: start of the file within the trial, and included strides."""
     file.add_parameter("SAGITTAL", "START_S", [start_s])
     if cycles:
         file.add_parameter("SAGITTAL", "STRIDE_SIDES", [c.side.capitalize() for c in cycles])

@@ -1,4 +1,4 @@
-"""What an export is written from: files of an analysis, a person's edits, and who walked, by pseudonym."""
+"""Input of an export: analysis files, edits, and pseudonymized facts about the visit."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ LATER = (POSES, signals.NAME, tracks.NAME)
 
 @dataclass(frozen=True)
 class VisitFacts:
-    """Who walked and how, as far as an export says it. No name, no birthday.
+    """Facts about patient and visit for an export, without name or date of birth.
 
     Parameters
     ----------
     subject : stable pseudonym for data sets, letters and digits. code : the clinic's own pseudonym.
-    visit : stable name of the visit for data sets. day : ISO date of the visit, None = not told.
-    age_years, height_m, sex, affected_side : None where not known.
-    condition : how it was walked, in words. version : of the software that writes the export.
+    visit : stable name of the visit for data sets. day : ISO date of the visit, None = withheld.
+    age_years, height_m, sex, affected_side : None if unknown.
+    condition : walking condition, in words. version : of the exporting software.
     """
 
     subject: str = "anonymous"
@@ -56,20 +56,20 @@ class VisitFacts:
 
     @classmethod
     def of_json(cls, values: Mapping[str, Any]) -> Self:
-        """From parameters of a job; members of other versions are left out."""
-        known = {f.name for f in fields(cls)}
-        return cls(**{k: v for k, v in values.items() if k in known})
+        """Create from job parameters; unknown keys are ignored."""
+        names = {f.name for f in fields(cls)}
+        return cls(**{k: v for k, v in values.items() if k in names})
 
 
 @dataclass(frozen=True, eq=False)
 class SignedForm:
-    """The signed report of a visit as an export hands it on.
+    """The signed report of a visit for an export.
 
     Parameters
     ----------
     version : of the report, from 1. language : of its text. signed_at : ISO date and time.
-    of_these_numbers : False where something was analysed or changed after it was signed.
-    documents : media type and bytes, the printable one first.
+    of_these_numbers : False if the results changed after signing.
+    documents : media type and content, the printable one first.
     """
 
     version: int
@@ -86,8 +86,8 @@ class CycleRow:
 
     Parameters
     ----------
-    number : from 1, in order of the list. turn_deg : None where not known. values : parameter → number or
-        None where undefined. flags : rules that it meets. excluded : why it does not count, None = it counts.
+    number : from 1, in order of the list. turn_deg : None if unknown. values : parameter → number, None if
+        undefined. flags : exclusion rules that apply. excluded : reason for exclusion, None = included.
     """
 
     number: int
@@ -102,14 +102,14 @@ class CycleRow:
 
 @dataclass(frozen=True, eq=False)
 class ExportContent:
-    """A finished analysis as it counts.
+    """A finished analysis including edits.
 
     Parameters
     ----------
     files : of `sagittal.server.report.files.exports`, name → reader of its bytes.
     bundle : with the edits applied.
-    columns : parameters of every stride of the list. edits : of a person, that count.
-    signed : the report in force, None where none is or the format does not hand it on.
+    columns : parameters of all strides. edits : edits in effect.
+    signed : the report in force, None if absent or not part of the format.
     """
 
     visit: VisitFacts
@@ -121,32 +121,32 @@ class ExportContent:
 
     @cached_property
     def poses(self) -> Poses:
-        """Segment poses; raises FormatError `export_not_possible` where there are none."""
+        """Segment poses; raises FormatError `export_not_possible` if there are none."""
         return read_poses(self.read_needed(POSES))
 
     @property
     def estimated(self) -> tuple[str, ...]:
-        """Angles with their side that a model of the leg gives, and no two sensors measure."""
+        """Angles with their side that are estimated by a leg model rather than measured by two sensors."""
         return tuple(sorted(list_estimated_angles(self.bundle.estimator)))
 
     @property
     def verdict(self) -> str:
-        """What the session's page says of the data, in words."""
+        """Data quality as shown on the session page, in words."""
         return numbers_of(self.bundle).verdict[1]
 
     @property
     def has_poses(self) -> bool:
-        """Whether segment poses are among the files."""
+        """Whether the files include segment poses."""
         return POSES in self.files
 
     @cached_property
     def signals(self) -> tuple[pa.Table, dict[str, Any]]:
-        """What the sensors measured, on one axis, and what is said of it; raises as `poses`."""
+        """Sensor signals on a common time axis and their metadata; raises like `poses`."""
         return read_table(self.read_needed(signals.NAME))
 
     @cached_property
     def levels(self) -> tuple[Parameter, ...]:
-        """Figures from the anatomical zero, where a goniometer's angles were entered."""
+        """Parameters relative to the anatomical zero, if goniometer angles were entered."""
         angles = self.bundle.angles
         if angles is None or not angles.standing_deg:
             return ()
@@ -155,12 +155,14 @@ class ExportContent:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """Figures of the take over the strides that count, those from the anatomical zero last."""
+        """Parameters of the trial over the included strides; those relative to the anatomical zero
+        come last.
+        """
         return (*self.bundle.parameters, *self.levels)
 
     @cached_property
     def cycles(self) -> tuple[CycleRow, ...]:
-        """Every stride of the list, or every squat, counted or not."""
+        """All strides or squats, included or not."""
         if self.bundle.repetitions is not None:
             return tuple(
                 CycleRow(i + 1, r.side, r.start_s, r.end_s, None, r.values, (), r.excluded)
@@ -188,7 +190,7 @@ class ExportContent:
         )
 
     def read_needed(self, name: str) -> bytes:
-        """Bytes of a result file; raises FormatError `export_not_possible`."""
+        """Read a required result file; raises FormatError `export_not_possible`."""
         if name not in self.files:
             raise FormatError(
                 "export_not_possible",
@@ -201,7 +203,7 @@ class ExportContent:
 def open_content(
     files: Mapping[str, Callable[[], bytes]], visit: VisitFacts, edits: Sequence[Edit] = ()
 ) -> ExportContent:
-    """Read an analysis and measure it with a person's edits.
+    """Read an analysis and recompute its parameters with the user's edits.
 
     Parameters
     ----------
@@ -209,15 +211,15 @@ def open_content(
 
     Raises
     ------
-    FormatError `no_analysis`, `newer_analysis`; `export_not_possible` where edits cannot be measured.
+    FormatError `no_analysis`, `newer_analysis`; `export_not_possible` if edits cannot be applied.
     """
     stored = load_bundle({name: read() for name, read in files.items() if name not in LATER})
     content = ExportContent(visit, files, stored, edits=tuple(edits))
     if not edits:
         columns = read_columns(files["strides.csv"]()) if "strides.csv" in files else {}
         return replace(content, columns=columns)
-    known = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
-    measured = measure_gait(known, edits)
+    stored_tracks = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
+    measured = measure_gait(stored_tracks, edits)
     reviewed = apply_review(stored, measured, edits)
     # as an analysis stores them: what is not finite is undefined
     rows: list[dict[str, Any]] = [parameter_row(p) for p in reviewed.parameters]

@@ -1,7 +1,7 @@
-"""A FHIR R4 bundle: a report with one observation per value, units by UCUM, codes of our own catalogue.
+"""FHIR R4 bundle: a report with one observation per value, UCUM units, codes of our own catalogue.
 
-Observations and report are "preliminary" until somebody signed these numbers; the signed report is attached.
-There is no LOINC code for most gait parameters; `LOINC` has the one whose meaning is the same.
+Observations and report are "preliminary" until the results are signed; the signed report is attached. Most
+gait parameters have no LOINC code; `LOINC` lists those with an equivalent one.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ def write_fhir(content: ExportContent) -> bytes:
 
 
 def _attach(signed: SignedForm) -> dict[str, Any]:
-    """Who signed, when, and the documents of it. FHIR's hash of an attachment is SHA-1."""
+    """Signature metadata and documents. FHIR prescribes SHA-1 as the hash of an attachment."""
     return {
         "issued": signed.signed_at,
         "resultsInterpreter": [{"display": signed.signed_by or "unknown"}],
@@ -144,14 +144,14 @@ def _attach(signed: SignedForm) -> dict[str, Any]:
 
 
 def _address(content: ExportContent, name: str) -> str:
-    """Where a resource stands in the bundle; the same for the same visit."""
+    """URN of a resource in the bundle, stable for the same visit."""
     return (
         f"urn:uuid:{uuid.uuid5(uuid.NAMESPACE_OID, f'{content.visit.subject} {content.visit.visit} {name}')}"
     )
 
 
 def _code(code: str, words: str) -> dict[str, Any]:
-    """One of our own codes, with its LOINC code where there is one."""
+    """One of our codes, with its LOINC code if there is one."""
     coding = [{"system": CODES, "code": code, "display": words}]
     if code in LOINC:
         number, display = LOINC[code]
@@ -169,52 +169,52 @@ def _quantity(value: float, unit: str, ucum: str) -> dict[str, Any]:
 
 
 def _ucum(unit: str) -> str:
-    """A unit in UCUM; one that it does not know is an annotation."""
+    """UCUM form of a unit; unsupported ones become an annotation."""
     return UCUM.get(unit, f"{{{unit}}}")
 
 
-def _absent(why: str) -> dict[str, Any]:
+def _absent(reason: str) -> dict[str, Any]:
     system = "http://terminology.hl7.org/CodeSystem/data-absent-reason"
-    return {"coding": [{"system": system, "code": "unknown"}], "text": why}
+    return {"coding": [{"system": system, "code": "unknown"}], "text": reason}
 
 
 def _observe(p: Parameter) -> dict[str, Any]:
-    """One value with its spread, or the reason why there is none."""
-    found: dict[str, Any] = {
+    """Observation of one value with its spread, or the reason of its absence."""
+    observation: dict[str, Any] = {
         "resourceType": "Observation",
         "code": _code(p.name, label_parameter(p.name)),
     }
     if p.side is not None:
-        found["bodySite"] = {"text": SIDE_WORDS[p.side]}
+        observation["bodySite"] = {"text": SIDE_WORDS[p.side]}
     if p.mean is None:
-        return found | {"dataAbsentReason": _absent(reason_words(p.reason))}
-    found["valueQuantity"] = _quantity(p.mean, p.unit, _ucum(p.unit))
-    given = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
-    found["component"] = [
+        return observation | {"dataAbsentReason": _absent(reason_words(p.reason))}
+    observation["valueQuantity"] = _quantity(p.mean, p.unit, _ucum(p.unit))
+    components = {"strides_behind": p.n, "standard_deviation": p.sd, "uncertainty_95": p.uncertainty}
+    observation["component"] = [
         {
             "code": _code(name, SPREAD[name][0]),
             "valueQuantity": _quantity(value, p.unit if own is None else "", own or _ucum(p.unit)),
         }
-        for name, value in given.items()
+        for name, value in components.items()
         if value is not None
         for own in (SPREAD[name][1],)
     ]
     if p.estimated:
-        found["note"] = [{"text": "From a model of the leg; no two sensors measure this angle."}]
-    return found
+        observation["note"] = [{"text": "From a model of the leg; no two sensors measure this angle."}]
+    return observation
 
 
 def _describe_patient(content: ExportContent) -> dict[str, Any]:
     v = content.visit
-    found = {
+    resource = {
         "resourceType": "Patient",
         "identifier": [{"system": SUBJECTS, "value": v.code or v.subject}],
     }
-    return found | ({} if v.sex is None else {"gender": v.sex})
+    return resource | ({} if v.sex is None else {"gender": v.sex})
 
 
 def _define_codes(values: Sequence[Parameter]) -> dict[str, Any]:
-    """The part of our catalogue that the bundle uses."""
+    """Code system with the part of our catalogue used in the bundle."""
     words = dict((REPORT, PANEL)) | {name: text for name, (text, _) in SPREAD.items()}
     concepts: list[dict[str, str]] = [{"code": code, "display": text} for code, text in words.items()]
     for name in dict.fromkeys(p.name for p in values):

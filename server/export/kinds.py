@@ -1,4 +1,4 @@
-"""The formats an analysis can be exported to: what each is called, needs, and is written by."""
+"""Export formats: names, required files and writers."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ExportKind:
 
     Parameters
     ----------
-    ending : of its file. label : what it is called. what : what is in it, for whom.
-    needs : result files without which it cannot be written. hands_on_signed : it holds the signed report.
+    ending : file extension. label : display name. what : content and purpose.
+    needs : required result files. hands_on_signed : includes the signed report.
     """
 
     name: ExportName
@@ -78,7 +78,7 @@ NAMES: Final[tuple[str, ...]] = get_args(ExportName)
 
 
 def find_kind(name: str) -> ExportKind:
-    """A format by its name; raises InputError `unknown_export`."""
+    """Find a format by name; raises InputError `unknown_export`."""
     for kind in KINDS:
         if kind.name == name:
             return kind
@@ -86,12 +86,12 @@ def find_kind(name: str) -> ExportKind:
 
 
 def name_file(kind: ExportKind, job_id: str) -> str:
-    """Name of an export among the files of its analysis, by the job that wrote it."""
+    """File name of an export within its analysis, from the id of its job."""
     return f"{EXPORTED}{kind.name}-{job_id[:8]}.{kind.ending}"
 
 
 def list_possible(files: Collection[str]) -> tuple[ExportKind, ...]:
-    """The formats that can be written from an analysis with these result files."""
+    """Formats that can be written from an analysis with these result files."""
     return tuple(kind for kind in KINDS if all(name in files for name in kind.needs))
 
 
@@ -100,7 +100,7 @@ DRAWN: Final[dict[str, Callable[[ExportContent], bytes]]] = {}
 
 
 def write_export(name: str, content: ExportContent) -> bytes:
-    """Write one format; raises InputError `unknown_export`, and SagittalError where it cannot be written."""
+    """Write one format; raises InputError `unknown_export`, or SagittalError if it cannot be written."""
     match find_kind(name).name:
         case "xlsx":
             from sagittal.server.export.workbook import write_workbook

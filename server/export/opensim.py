@@ -1,7 +1,7 @@
-"""Joint angles as OpenSim coordinates (.mot) and orientations as OpenSense takes them (.sto).
+"""Export to OpenSim: joint angles as coordinates (.mot), orientations for OpenSense (.sto).
 
-Coordinates and signs are those of the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files
-are text as OpenSim 4 writes it. OpenSim's ground has x forward, y up, z to the right.
+Coordinates and signs follow the model of Rajagopal et al. 2016 (doi:10.1109/TBME.2016.2586891); files use the
+text format of OpenSim 4. OpenSim's ground frame has x forward, y up, z to the right.
 """
 
 from __future__ import annotations
@@ -45,21 +45,21 @@ IMU_NAMES: Final[Mapping[Segment, str]] = {
 
 
 def write_opensim(content: ExportContent) -> bytes:
-    """Write angles.mot, orientations.sto where there are poses, and which strides count."""
+    """Write angles.mot, orientations.sto if there are poses, and the list of included strides."""
     angles = content.bundle.angles
     if angles is None:
         raise FormatError("export_not_possible", "This analysis has no joint angles; OpenSim takes nothing.")
     files = {"angles.mot": write_motion(angles)}
     if content.has_poses:
-        worn = (content.bundle.calibration or {}).get("segments", IMU_NAMES)
-        files["orientations.sto"] = write_orientations(content.poses, worn)
+        segments = (content.bundle.calibration or {}).get("segments", IMU_NAMES)
+        files["orientations.sto"] = write_orientations(content.poses, segments)
     for name, table in (("strides", sheets.list_cycles(content)), ("about", sheets.list_about(content))):
         files[f"{name}.csv"] = write_csv(table.header, table.rows)
     return zip_files(files)
 
 
 def write_motion(angles: JointAngles) -> bytes:
-    """Write coordinates in degrees over time; a moment at which one of them is not known is left out."""
+    """Write coordinates in degrees over time; rows with an unknown coordinate are omitted."""
     columns = {n: np.degrees(x) for n, x in find_coordinates(angles).items() if np.isfinite(x).any()}
     if not columns:
         raise FormatError("export_not_possible", "No joint angle of this analysis is an OpenSim coordinate.")
@@ -73,54 +73,57 @@ def write_motion(angles: JointAngles) -> bytes:
 
 
 def find_coordinates(angles: JointAngles) -> dict[str, Floats]:
-    """Coordinate → (n,) rad, NaN where not known.
+    """Coordinate → (n,) rad, NaN where unknown.
 
-    The pelvis turns in OpenSim about z, x, y of ground (tilt, list, rotation), not about y, x, z as in ours.
-    Its rotation is that of its own heading, from 0 where the take begins.
+    OpenSim's pelvis rotates about z, x, y of ground (tilt, list, rotation), ours about y, x, z. Pelvis
+    rotation is its heading relative to the start of the trial.
     """
-    given = angles.angles
-    found: dict[str, Floats] = {}
-    if "pelvis_tilt" in given:
+    by_name = angles.angles
+    coordinates: dict[str, Floats] = {}
+    if "pelvis_tilt" in by_name:
         heading = angles.headings.get("pelvis")
         turned = np.zeros(len(angles.t_s)) if heading is None else heading - _find_first(heading)
-        q = multiply(about(1, turned), about(0, -given["pelvis_obliquity"]))
-        tilt, side_down, rotation = cardan_zxy(multiply(q, about(2, -given["pelvis_tilt"]))).T
-        found |= {"pelvis_tilt": tilt, "pelvis_list": side_down}
+        q = multiply(about(1, turned), about(0, -by_name["pelvis_obliquity"]))
+        tilt, side_down, rotation = cardan_zxy(multiply(q, about(2, -by_name["pelvis_tilt"]))).T
+        coordinates |= {"pelvis_tilt": tilt, "pelvis_list": side_down}
         if heading is not None:
-            known = np.isfinite(rotation)
-            rotation[known] = np.unwrap(rotation[known])
-            found["pelvis_rotation"] = rotation
+            finite = np.isfinite(rotation)
+            rotation[finite] = np.unwrap(rotation[finite])
+            coordinates["pelvis_rotation"] = rotation
     for side in reversed(SIDES):
         k = SUFFIX[side]
-        found |= {f"{name}_{k}": given[f"{ours}_{k}"] for ours, name in LEG if f"{ours}_{k}" in given}
-    return found
+        coordinates |= {
+            f"{name}_{k}": by_name[f"{ours}_{k}"] for ours, name in LEG if f"{ours}_{k}" in by_name
+        }
+    return coordinates
 
 
 def _find_first(heading: Floats) -> float:
-    known = heading[np.isfinite(heading)]
-    return float(known[0]) if len(known) else 0.0
+    finite = heading[np.isfinite(heading)]
+    return float(finite[0]) if len(finite) else 0.0
 
 
-def write_orientations(poses: Poses, worn: Collection[str]) -> bytes:
-    """Write one quaternion "w,x,y,z" per segment with a sensor and moment; moments with a loss are left out.
+def write_orientations(poses: Poses, instrumented: Collection[str]) -> bytes:
+    """Write one quaternion "w,x,y,z" per instrumented segment and time; rows with missing data are omitted.
 
-    Each is the sensor put straight onto its segment: x forward, y up, z to the right while standing, in a
-    world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 makes standing the identity.
+    Each describes the sensor axes aligned with its segment: x forward, y up, z to the right in quiet
+    standing, in a world with z up. OpenSense's usual `sensor_to_opensim_rotations` of −π/2 0 0 maps standing
+    to identity.
 
     Parameters
     ----------
-    worn : segments that carry a sensor.
+    instrumented : instrumented segments.
     """
-    kept = [s for s in IMU_NAMES if s in poses.q and s in worn]
-    ok = poses.valid & np.all([np.isfinite(poses.q[s]).all(axis=1) for s in kept], axis=0)
+    segments = [s for s in IMU_NAMES if s in poses.q and s in instrumented]
+    ok = poses.valid & np.all([np.isfinite(poses.q[s]).all(axis=1) for s in segments], axis=0)
     cells = []
-    for segment in kept:
+    for segment in segments:
         q = poses.q[segment][ok]
         # neighbours on one side of the sphere, so that who interpolates stays on it
         flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))
         q = q * np.concatenate(([1.0], flips))[:, None] if len(q) else q
         cells.append([",".join(f"{x:.9f}" for x in row) for row in q.tolist()])
     head = f"DataRate={poses.rate_hz:.6f}\nDataType=Quaternion\nversion=3\nendheader\n"
-    lines = ["\t".join(("time", *(IMU_NAMES[s] for s in kept)))]
+    lines = ["\t".join(("time", *(IMU_NAMES[s] for s in segments)))]
     lines += ["\t".join((f"{t:.6f}", *row)) for t, *row in zip(poses.t_s[ok].tolist(), *cells, strict=True)]
     return (head + "\n".join(lines) + "\n").encode()

@@ -1,6 +1,6 @@
-"""The tables of an export, each a header and rows; workbook and CSV write the same ones.
+"""Tables of an export, each with a header and rows, shared by workbook and CSV.
 
-Names, units and definitions come from the catalogue of parameters.
+Names, units and definitions are taken from the catalogue of parameters.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ TABLE_COLUMNS: Final = {
 
 
 def list_about(content: ExportContent) -> TableSheet:
-    """Who, when, how, and by what the numbers were made."""
-    v, made = content.visit, content.bundle.provenance
+    """Table of patient, visit, conditions and software."""
+    v, origin = content.visit, content.bundle.provenance
     quality, angles = content.bundle.quality, content.bundle.angles
     rows: list[Row] = [
         ("subject", v.subject),
@@ -83,16 +83,16 @@ def list_about(content: ExportContent) -> TableSheet:
         ("angle_zero", None if angles is None else angles.zero),
         ("edits", len(content.edits)),
         ("exported_by", f"Sagittal {v.version}".strip()),
-        ("analysed_by", made.get("version")),
-        ("parameters_sha256", made.get("parameters_sha256")),
-        *((f"input_sha256 {name}", digest) for name, digest in (made.get("input_sha256") or {}).items()),
+        ("analysed_by", origin.get("version")),
+        ("parameters_sha256", origin.get("parameters_sha256")),
+        *((f"input_sha256 {name}", digest) for name, digest in (origin.get("input_sha256") or {}).items()),
         ("notice", "Research and documentation software, not a medical device, not for diagnosis."),
     ]
     return TableSheet("About", ("what", "value"), tuple(rows))
 
 
 def list_parameters(content: ExportContent) -> TableSheet:
-    """One row per parameter and side: of the strides that count."""
+    """One row per parameter and side, over the included strides."""
     header = ("parameter", "side", "n", "mean", "sd", "unit", "cv_pct", "ci_low", "ci_high")
     rows = tuple(
         (
@@ -111,7 +111,7 @@ CYCLE: Final = (
 
 
 def list_cycles(content: ExportContent) -> TableSheet:
-    """One row per stride or squat, its parameters side by side."""
+    """One row per stride or squat, with one column per parameter."""
     names = tuple(dict.fromkeys(name for c in content.cycles for name in c.values))
     rows = tuple(
         (
@@ -142,7 +142,7 @@ def list_values(content: ExportContent) -> TableSheet:
 
 
 def list_curves(content: ExportContent) -> TableSheet:
-    """Mean and standard deviation of each angle in degrees, a row per % of the stride; those that count."""
+    """Mean and standard deviation of each angle in degrees over the included strides, one row per %."""
     angles = content.bundle.angles
     if angles is None:
         return TableSheet("Curves", ("pct_cycle",), ())
@@ -159,7 +159,7 @@ def list_curves(content: ExportContent) -> TableSheet:
 
 
 def _in_degrees(curve: MeanCurve) -> list[list[float | None]]:
-    """Mean and standard deviation, 101 numbers each; None where undefined."""
+    """Mean and standard deviation, 101 numbers each; None if undefined."""
     nothing: list[float | None] = [None] * POINTS
     return [
         nothing if values is None else [degrees(x) if isfinite(x) else None for x in values.tolist()]
@@ -168,19 +168,19 @@ def _in_degrees(curve: MeanCurve) -> list[list[float | None]]:
 
 
 def list_events(content: ExportContent) -> TableSheet:
-    """Contacts in order of time, with those that a person moved or set."""
+    """Contacts in order of time, including those edited manually."""
     rows = tuple((e.time_s, e.side, e.kind, e.source) for e in content.bundle.events.events)
     return TableSheet("Contacts", ("time_s", "side", "kind", "source"), rows)
 
 
 def list_notices(content: ExportContent) -> TableSheet:
-    """Everything the analysis has to say of the take."""
+    """All notices of the analysis."""
     rows = tuple((n.severity, n.code, n.message, n.sensor, n.t_s) for n in content.bundle.warnings)
     return TableSheet("Notices", ("severity", "code", "message", "sensor", "time_s"), rows)
 
 
 def list_dictionary(content: ExportContent) -> TableSheet:
-    """What every column and every parameter of these tables is."""
+    """Definitions of all columns and parameters of these tables."""
     used = {p.name for p in content.parameters} | {n for c in content.cycles for n in c.values}
     header = ("name", "label", "unit", "group", "of", "mean_of", "definition")
     columns = [(name, None, unit_of(name), "columns", None, None, s) for name, s in TABLE_COLUMNS.items()]

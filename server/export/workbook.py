@@ -1,4 +1,4 @@
-"""An Excel workbook of an analysis; text is written as text, so that none of it is taken for a formula."""
+"""Excel workbook of an analysis; text is written as strings, so that it is never interpreted as formulas."""
 
 from __future__ import annotations
 

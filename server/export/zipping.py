@@ -1,4 +1,4 @@
-"""Several files in one zip, the same bytes for the same files."""
+"""Reproducible zips: the same files give the same bytes."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ def zip_files(files: Mapping[str, bytes]) -> bytes:
 
 
 class ZipSink(io.RawIOBase):
-    """What a zip is written into: it cannot go back, and hands on what came."""
+    """Unseekable output of a zip whose content can be taken while it is written."""
 
     def __init__(self) -> None:
         self._pieces: list[bytes] = []
 
     def writable(self) -> bool:
-        """Yes."""
+        """Return True."""
         return True
 
     def write(self, data: Any) -> int:
-        """Keep some bytes."""
+        """Append bytes."""
         self._pieces.append(bytes(data))
         return len(data)
 
     def take(self) -> bytes:
-        """What has come since it was last asked."""
-        taken = b"".join(self._pieces)
+        """Return the bytes written since the last call."""
+        content = b"".join(self._pieces)
         self._pieces.clear()
-        return taken
+        return content

@@ -1,1 +1,1 @@
-"""What every request and every answer passes: guards, limits, headers, compression, problems."""
+"""HTTP middleware and responses: guards, limits, headers, compression and problem details."""

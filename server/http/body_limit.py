@@ -1,4 +1,4 @@
-"""Bounds the body of every request that is no file upload, before anything reads it into memory."""
+"""Limits the body of every request other than file uploads before it is read into memory."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ _UPLOAD = re.compile(
 
 
 class BodyLimit:
-    """ASGI middleware; uploads have limits of their own (settings.max_file_bytes)."""
+    """ASGI middleware; uploads have their own limits (settings.max_file_bytes)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request, or refuse its body with 413."""
+        """Serve one request, or reject its body with 413."""
         if scope["type"] != "http" or _UPLOAD.match(f"{scope['method']} {scope['path']}"):
             await self.app(scope, receive, send)
             return

@@ -1,4 +1,4 @@
-"""Carries the messages of a websocket to another server and back."""
+"""Relays websocket messages to another server and back."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ async def carry_messages(
     admits: Callable[[Message], bool] = lambda _: True,
     until: Coroutine[Any, Any, str] | None = None,
 ) -> None:
-    """Carry messages both ways until one side ends or the right to see does; the close code is passed on.
+    """Relay messages in both directions until one side closes or access ends; the close code is forwarded.
 
     Parameters
     ----------
-    admits : which messages of the client are passed on. until : returns, when it must end, why.
+    admits : filter for messages of the client. until : completes with a reason when the relay must end.
     """
     over = None if until is None else asyncio.create_task(until)
     tasks = [asyncio.create_task(_down(ws, up)), asyncio.create_task(_upward(ws, up, admits))]
@@ -34,11 +34,11 @@ async def carry_messages(
     try:
         await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
     finally:
-        why = over.result() if over is not None and over.done() else None
+        end_reason = over.result() if over is not None and over.done() else None
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        code, reason = _close_code(up) if why is None else (WS_1008_POLICY_VIOLATION, why)
+        code, reason = _close_code(up) if end_reason is None else (WS_1008_POLICY_VIOLATION, end_reason)
         # the client may be gone already
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await ws.close(code, reason)
@@ -65,6 +65,6 @@ async def _upward(ws: WebSocket, up: ClientConnection, admits: Callable[[Message
 
 
 def _close_code(up: ClientConnection) -> tuple[int, str]:
-    """Code and reason to give to the client; 1005 and 1006 mean "none given" and may not be sent."""
+    """Close code and reason for the client; 1005 and 1006 mean "none given" and must not be sent."""
     code = up.close_code
     return (1000, "") if code is None or code in (1005, 1006) else (code, up.close_reason or "")

@@ -1,12 +1,12 @@
-"""Answers go over the network compressed: pages, JSON, style sheets and scripts become a fifth.
+"""Compresses pages, JSON, style sheets and scripts to about a fifth of their size.
 
-Not compressed are event streams (an event must not wait for the next), files to save and parts of files
-(their bytes are what the caller asked for), and what is packed already.
+Event streams (an event must not wait for the next), downloads and ranges (the client expects the exact bytes)
+and content that is already compressed are sent unchanged.
 
-Compression lets somebody who listens to the encrypted line, and makes a browser ask again and again with
-guesses of his own in the address, find out what else the page says, from its length alone (BREACH). For this
-the requests must start on a page of his: browsers mark those as cross-site, and they get no compression. No
-page carries a token against forgery (cross_site.py goes by the same marks), and the cookie is in no page.
+Compression makes a BREACH attack possible: an eavesdropper who causes a browser to repeat requests with
+guesses in the URL can infer the page's content from the length of the encrypted response. Such requests
+originate from the attacker's page; browsers mark them as cross-site, and their responses are not compressed.
+No page contains an anti-forgery token (cross_site.py relies on the same headers) or the session cookie.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _GZIP_FORMAT: Final = 16 + zlib.MAX_WBITS
 
 
 class Compression:
-    """ASGI middleware that compresses what is worth it, for those who take gzip."""
+    """ASGI middleware that compresses suitable responses for clients that accept gzip."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
@@ -57,7 +57,7 @@ def accepts(encoding: str, accept_encoding: str) -> bool:
 
 
 def is_compressible(status: int, headers: Headers) -> bool:
-    """Whether an answer is text as a whole, to be shown and not saved."""
+    """Whether a response is complete text meant for display rather than download."""
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()
     return (
         status not in (204, 206, 304)
@@ -70,7 +70,9 @@ def is_compressible(status: int, headers: Headers) -> bool:
 
 
 class _Answer:
-    """One answer on its way; its head waits for the first of its body, which tells whether it is worth it."""
+    """A response in progress; its headers wait for the first part of the body, which decides on
+    compression.
+    """
 
     def __init__(self, send: Send, takes_gzip: bool) -> None:
         self._send = send
@@ -79,7 +81,7 @@ class _Answer:
         self._packer: Any = None
 
     async def pass_on(self, message: Message) -> None:
-        """Send one message of the application."""
+        """Forward one message of the application."""
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
             is_candidate = is_compressible(message["status"], headers)
@@ -112,7 +114,7 @@ class _Answer:
 
 
 def _declare(headers: MutableHeaders, size: int | None) -> None:
-    """Say in the head of an answer that it is compressed; `size` None = not known before its end."""
+    """Set the headers of a compressed response; `size` None = not known in advance."""
     headers["Content-Encoding"] = "gzip"
     del headers["Content-Length"]
     if size is not None:

@@ -1,9 +1,9 @@
-"""Cross-site requests are refused by the headers browsers set themselves; no tokens in forms.
+"""Rejects cross-site requests by the headers that browsers set; forms need no tokens.
 
-Sec-Fetch-Site where the browser sends it (W3C Fetch Metadata), else Origin against Host
-(the same rule as Go's net/http.CrossOriginProtection). A client without either header is no browser
-and carries no cookie that somebody else could borrow. On a websocket the browser lets any page connect,
-so there the rule holds for the opening request too.
+Uses Sec-Fetch-Site if present (W3C Fetch Metadata), otherwise compares Origin with Host, the rule of Go's
+net/http.CrossOriginProtection. A client that sends neither header is not a browser and carries no cookie that
+another site could exploit. Browsers let any page open a websocket, so the rule also applies to the opening
+handshake.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 def is_cross_site(headers: Headers) -> bool:
-    """Tell whether a browser sent this request on behalf of another site."""
+    """Whether a browser sent this request on behalf of another site."""
     origin = headers.get("origin")
     site = headers.get("sec-fetch-site")
     if site is not None and site not in {"same-origin", "none"}:
@@ -31,13 +31,13 @@ def is_cross_site(headers: Headers) -> bool:
 
 
 class CrossSiteGuard:
-    """ASGI middleware that refuses cross-site changes and cross-site websockets before they are accepted."""
+    """ASGI middleware that rejects cross-site changes and cross-site websockets before they are accepted."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve or refuse one connection."""
+        """Serve or reject one connection."""
 
         guarded = scope["type"] == "websocket" or (
             scope["type"] == "http" and scope["method"] not in SAFE_METHODS

@@ -1,4 +1,4 @@
-"""Security headers of every answer; the viewer document brings its own content policy."""
+"""Security headers of every response; the viewer document has its own content security policy."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ HTTPS_ONLY = "max-age=31536000"
 
 
 def allow_camera(origins: str) -> str:
-    """Return the policy of a page whose camera these origins may use: "()" none, "(self)" its own."""
+    """Return the Permissions-Policy value for camera access: "()" none, "(self)" this origin."""
     return f"camera={origins}, microphone=(), geolocation=()"
 
 
 def lock_document(style_sha256: str) -> str:
-    """Return the policy of a document that stands alone: one style in it, base64 of its hash, and no more."""
+    """Return the policy of a self-contained document that allows one inline style, given by its base64
+    hash.
+    """
     return (
         f"default-src 'none'; style-src 'sha256-{style_sha256}'; img-src data:; "
         "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -54,7 +56,7 @@ class SecurityHeaders:
 
     Parameters
     ----------
-    behind_tls : browsers are told to ask for nothing but https from now on.
+    behind_tls : also send Strict-Transport-Security, so that browsers use HTTPS only.
     """
 
     def __init__(self, app: ASGIApp, *, behind_tls: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Host allow-list: a name that is not ours is refused, so DNS rebinding cannot borrow our origin."""
+"""Host allow-list: rejects unknown host names, so that DNS rebinding cannot use our origin."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ def host_name(host: str) -> str:
 
 
 class HostGuard:
-    """ASGI middleware that serves only loopback names and the configured ones, http and websocket alike."""
+    """ASGI middleware that accepts only loopback and configured host names, for HTTP and websockets."""
 
     def __init__(self, app: ASGIApp, allowed: Iterable[str] = ()) -> None:
         self.app = app
         self.allowed = LOOPBACK | {host_name(name) for name in allowed}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve or refuse one connection."""
+        """Serve or reject one connection."""
 
         if scope["type"] in {"http", "websocket"}:
             hosts = Headers(scope=scope).getlist("host")

@@ -1,4 +1,4 @@
-"""Bodies of requests read by the one rule for JSON from outside (core/formats/json_tree.py)."""
+"""Request bodies parsed with the strict rules for untrusted JSON (core/formats/json_tree.py)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sagittal.core.formats.json_tree import read_json
 
 
 class StrictJsonRequest(Request):
-    """A request whose JSON has no key twice, no NaN, no lone surrogate and no great depth."""
+    """A request whose JSON must not have duplicate keys, NaN, lone surrogates or deep nesting."""
 
     async def json(self) -> Any:
-        """Return the body as Python values; raises JSONDecodeError, which FastAPI answers with 422."""
+        """Return the body as Python values; raises JSONDecodeError, which FastAPI converts to 422."""
         body = await self.body()
         try:
             return read_json(body)
@@ -25,10 +25,10 @@ class StrictJsonRequest(Request):
 
 
 class StrictJsonRoute(APIRoute):
-    """A route that reads its body so; `APIRouter(route_class=StrictJsonRoute)`."""
+    """Route that parses its body strictly; use `APIRouter(route_class=StrictJsonRoute)`."""
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what serves a request."""
+        """Return the request handler."""
         handler = super().get_route_handler()
 
         async def handle(request: Request) -> Response:

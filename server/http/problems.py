@@ -1,4 +1,4 @@
-"""The one place where an error becomes an answer: RFC 9457 problem+json, or a page for a browser."""
+"""Central conversion of errors to responses: RFC 9457 problem+json, or a page for browsers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ LOGGED_HERE = (SagittalError, OperationalError)
 
 
 class Problem(HTTPException):
-    """A refusal with its HTTP status, a stable code and a sentence that says what to do."""
+    """An error response with its HTTP status, a stable code and a sentence with the remedy."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class Problem(HTTPException):
         self.errors = errors
 
     def to_json(self) -> dict[str, Any]:
-        """Return the members of RFC 9457 §3.1 plus `code` and, for bad fields, `errors`."""
+        """Return the members of RFC 9457 §3.1 plus `code` and, for invalid fields, `errors`."""
         body: dict[str, Any] = {
             "type": f"urn:sagittal:problem:{self.code}",
             "title": self.code.replace("_", " ").capitalize(),
@@ -71,7 +71,7 @@ class Problem(HTTPException):
 
 
 def as_problem(error: Exception) -> Problem:
-    """Translate any exception; what we did not foresee says nothing about its cause."""
+    """Convert any exception to a Problem; the cause of an unexpected one is not disclosed."""
     if isinstance(error, Problem):
         return error
     if isinstance(error, StoreAway):
@@ -92,10 +92,10 @@ def as_problem(error: Exception) -> Problem:
         )
     if isinstance(error, AnyHttpException):
         code = CODE_OF_STATUS.get(error.status_code, "http_error")
-        said = str(error.detail)
-        is_bare = said == HTTPStatus(error.status_code).phrase
+        text = str(error.detail)
+        is_bare = text == HTTPStatus(error.status_code).phrase
         return Problem(
-            error.status_code, code, SENTENCES.get(code, said) if is_bare else said, headers=error.headers
+            error.status_code, code, SENTENCES.get(code, text) if is_bare else text, headers=error.headers
         )
     refusal = refusal_of(error)
     if refusal is not None:
@@ -108,7 +108,7 @@ def as_problem(error: Exception) -> Problem:
 
 
 def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
-    """Answer with JSON, or for a browser's page request with a page (401: with the sign-in page)."""
+    """Respond with JSON, or with a page to a browser's page request (401: the sign-in page)."""
     if _wants_page(connection):
         if problem.status == HTTPStatus.UNAUTHORIZED and connection.scope["method"] == "GET":
             path = connection.url.path + (f"?{connection.url.query}" if connection.url.query else "")
@@ -127,7 +127,9 @@ def problem_response(problem: Problem, connection: HTTPConnection) -> Response:
 
 
 async def send_problem(problem: Problem, scope: Scope, receive: Receive, send: Send) -> None:
-    """Refuse a request from inside a middleware; a websocket is refused before it is accepted (HTTP 403)."""
+    """Reject a request from within a middleware; websockets are rejected before they are accepted
+    (HTTP 403).
+    """
     if scope["type"] == "websocket":
         await refuse_websocket(WebSocket(scope, receive, send), problem)
     else:
@@ -135,7 +137,9 @@ async def send_problem(problem: Problem, scope: Scope, receive: Receive, send: S
 
 
 async def refuse_websocket(websocket: WebSocket, problem: Problem) -> None:
-    """Refuse with the problem's own status where the server can, else by closing (uvicorn answers 403)."""
+    """Reject with the problem's own status if the server supports it, otherwise by closing (403 in
+    uvicorn).
+    """
     if websocket.application_state is not WebSocketState.CONNECTING:
         await websocket.close(1008, problem.code)
     elif "websocket.http.response" in websocket.scope.get("extensions", {}):
@@ -146,7 +150,7 @@ async def refuse_websocket(websocket: WebSocket, problem: Problem) -> None:
 
 
 def install(app: FastAPI) -> None:
-    """Register the one handler for everything an endpoint may raise."""
+    """Register the single handler for all exceptions of endpoints."""
 
     async def handle(connection: HTTPConnection, error: Exception) -> Response | None:
         problem = as_problem(error)
@@ -166,9 +170,9 @@ def install(app: FastAPI) -> None:
         response = problem_response(problem, connection)
         # Starlette answers 500 outside of all middleware
         add_security_headers(response.headers)
-        asked = request_id.get()
-        if asked is not None:
-            response.headers["X-Request-ID"] = asked
+        current_id = request_id.get()
+        if current_id is not None:
+            response.headers["X-Request-ID"] = current_id
         return response
 
     async def handle_disk(connection: HTTPConnection, error: Exception) -> Response | None:
@@ -200,7 +204,7 @@ def _wants_page(connection: HTTPConnection) -> bool:
 
 
 def _list_allowed(scope: Scope) -> dict[str, str]:
-    """Return the header Allow with every method that any route offers at this path."""
+    """Return the Allow header with the methods of all routes at this path."""
     routes = [one for one in scope["app"].routes if not isinstance(one, Mount)]
     allowed = [
         method
@@ -211,7 +215,7 @@ def _list_allowed(scope: Scope) -> dict[str, str]:
 
 
 def _names_nothing(error: Exception) -> bool:
-    """Whether an id in the path has not the form that ids have, so that there is nothing at the address."""
+    """Whether an id in the path is malformed, so that the resource cannot exist."""
     return isinstance(error, RequestValidationError) and any(e["loc"][0] == "path" for e in error.errors())
 
 

@@ -1,4 +1,4 @@
-"""Answering a request for a part of something long, such as a player's for a video (RFC 9110 §14)."""
+"""Range requests for long content, such as those of video players (RFC 9110 §14)."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ def answer_range(
     read: Callable[[int, int], bytes],
     media_type: str,
 ) -> Response:
-    """Answer with the one range that is asked for, or with all; several at once get all.
+    """Respond with the requested range, or the whole content if none or several are requested.
 
     Parameters
     ----------
-    headers : of the request, their names in small letters. size : bytes of the whole.
-    version : what changes with its content; a range of another version gets all.
-    read : gives the bytes from a place to before another.
+    headers : of the request, names in lower case. size : total bytes.
+    version : entity tag; a range of another version returns the whole content.
+    read : returns the bytes from start to stop.
     """
     tag = f'"{version}"'
     ours = {"Accept-Ranges": "bytes", "ETag": tag}
-    asked = _RANGE.fullmatch(headers.get("range", "").replace(" ", ""))
-    if asked is None or asked.group(1, 2) == ("", "") or headers.get("if-range", tag) != tag:
+    match = _RANGE.fullmatch(headers.get("range", "").replace(" ", ""))
+    if match is None or match.group(1, 2) == ("", "") or headers.get("if-range", tag) != tag:
         return _stream(read, 0, size, media_type, 200, ours)
-    first, last = asked.groups()
+    first, last = match.groups()
     start = max(size - int(last), 0) if not first else int(first)
     stop = min(int(last) + 1, size) if first and last else size
     if first and last and int(last) < int(first):
         return _stream(read, 0, size, media_type, 200, ours)  # no range at all
     if start >= size:
         return Response(status_code=416, headers={**ours, "Content-Range": f"bytes */{size}"})
-    said = {**ours, "Content-Range": f"bytes {start}-{stop - 1}/{size}"}
-    return _stream(read, start, stop, media_type, 206, said)
+    response_headers = {**ours, "Content-Range": f"bytes {start}-{stop - 1}/{size}"}
+    return _stream(read, start, stop, media_type, 206, response_headers)
 
 
 def _stream(
@@ -57,8 +57,8 @@ def _stream(
 
     def rest() -> Iterator[bytes]:
         yield first
-        for at in range(start + PIECE, stop, PIECE):
-            yield read(at, min(at + PIECE, stop))
+        for position in range(start + PIECE, stop, PIECE):
+            yield read(position, min(position + PIECE, stop))
 
     length = {"Content-Length": str(stop - start)}
     return StreamingResponse(rest(), status, {**headers, **length}, media_type)

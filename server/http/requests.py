@@ -1,6 +1,7 @@
-"""Around every request: an id of its own, how long it took, and a line in a log for machines.
+"""Request ids, durations and machine-readable access log lines.
 
-Neither holds an address with its query, a name or what was sent: a route's pattern, a method, a status.
+Neither log lines nor metrics contain query strings, names or bodies, only the route's pattern, the method and
+the status.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ _PREFIXES: Final = ("/api/v1", "/static")
 
 
 class RequestObserver:
-    """ASGI middleware that gives ids and tells `observe` (method, pattern of the route, status, seconds).
+    """ASGI middleware that assigns request ids and calls `observe(method, route pattern, status, seconds)`.
 
     Parameters
     ----------
-    line : whether each request is a line of the log.
+    line : whether to write a log line for each request.
     """
 
     def __init__(
@@ -66,8 +67,13 @@ class RequestObserver:
         if self._observe is not None:
             self._observe(scope["method"], pattern, status, took_s)
         if self._line:
-            told = {"method": scope["method"], "route": pattern, "status": status, "took_s": round(took_s, 4)}
-            log.info("request", extra=told)
+            fields = {
+                "method": scope["method"],
+                "route": pattern,
+                "status": status,
+                "took_s": round(took_s, 4),
+            }
+            log.info("request", extra=fields)
 
 
 def _find_pattern(scope: Scope) -> str:

@@ -1,4 +1,4 @@
-"""The templates of web/templates, with the filters and the words that all of them use, in every language."""
+"""Jinja environments of web/templates, one per language, with shared filters and terms."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ FOLDER: Final = Path(web.__file__).parent
 
 
 class FlushLeftLoader(FileSystemLoader):
-    """Templates without their indentation, which is for those who read them and a seventh of a page."""
+    """Loads templates without their indentation, which accounts for a seventh of a page."""
 
     def get_source(self, environment: Environment, template: str) -> tuple[str, str, Callable[[], bool]]:
-        """Return source, file and whether it is still the newest; every line keeps its number."""
+        """Return source, file and up-to-date check; line numbers are preserved."""
         source, name, is_newest = super().get_source(environment, template)
         return re.sub(r"\n[ \t]+", "\n", source), name, is_newest
 
 
 class SpokenLoader(FlushLeftLoader):
-    """The same templates, every text of which asks the catalogue of a language."""
+    """Loads templates with all text replaced by look-ups in a language's catalogue."""
 
     def get_source(self, environment: Environment, template: str) -> tuple[str, str, Callable[[], bool]]:
-        """Return source, file and whether it is still the newest."""
+        """Return source, file and up-to-date check."""
         source, name, is_newest = super().get_source(environment, template)
         return speak_template(source), name, is_newest
 
 
 @cache
 def fingerprint_pages() -> str:
-    """Digest of all that pages are made of, and of what makes Python of them."""
+    """Digest of everything that determines the compiled templates, including the code that compiles them."""
     digest = hashlib.sha256()
     for path in (Path(__file__), Path(compiler.__file__), *sorted(FOLDER.rglob("*"))):
         if path.is_file() and path.suffix != ".pyc":
@@ -61,9 +61,10 @@ def fingerprint_pages() -> str:
 
 
 class KeptBytecode(FileSystemBytecodeCache):
-    """What the templates of a language are in Python, kept in the folder of compiled filters.
+    """Cache of compiled templates of one language, in the folder of compiled filters.
 
-    To make it is a third of the first page of a process. Where nothing can be written, every process does.
+    Compiling takes a third of the time of a process's first page. If the folder is not writable, each process
+    compiles its own.
     """
 
     def __init__(self, language: str) -> None:
@@ -72,49 +73,49 @@ class KeptBytecode(FileSystemBytecodeCache):
         self._pages = fingerprint_pages()
 
     def get_source_checksum(self, source: str) -> str:
-        """Of a template and of what is worked out with it: words, texts, addresses of files."""
+        """Digest of a template and of the terms, texts and file addresses that are inlined in it."""
         return hashlib.sha256(f"{self._pages}{source}".encode()).hexdigest()
 
     def load_bytecode(self, bucket: Bucket) -> None:
-        """Read what an earlier process has kept; a file that cannot be read is none."""
+        """Read the bytecode cached by an earlier process; an unreadable file counts as missing."""
         try:
             super().load_bytecode(bucket)
         except Exception:  # noqa: BLE001  # a damaged pickle raises anything
             bucket.reset()
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep a template for the next process."""
+        """Cache a template for later processes."""
         with suppress(OSError):
             super().dump_bytecode(bucket)
 
 
 class SettledEnvironment(Environment):
-    """An environment whose globals all stand before the first template is loaded.
+    """Environment whose globals are complete before the first template is loaded.
 
-    Jinja keeps those of a template and of the environment apart, and finds in every import of a page anew,
-    name by name, that they are the same: a fifteenth of a page.
+    By default Jinja keeps the globals of templates and environment apart and compares them name by name at
+    every import, which takes a fifteenth of the rendering time of a page.
     """
 
     def make_globals(self, d: MutableMapping[str, Any] | None) -> MutableMapping[str, Any]:
-        """Return the globals of a template: those of all and its own."""
+        """Return the globals of a template merged with those of the environment."""
         return {**self.globals, **(d or {})}
 
 
 def load_templates(language: str) -> Jinja2Templates:
-    """Return the environment in which every page of a language is rendered."""
+    """Return the environment for rendering pages in a language."""
     folder = FOLDER / "templates"
     is_source = language == SOURCE
     loader = FlushLeftLoader(folder) if is_source else SpokenLoader(folder)
-    kept = KeptBytecode(language) if VARIABLE in os.environ else None
+    bytecode = KeptBytecode(language) if VARIABLE in os.environ else None
     templates = Jinja2Templates(
-        env=SettledEnvironment(loader=loader, autoescape=True, bytecode_cache=kept),
+        env=SettledEnvironment(loader=loader, autoescape=True, bytecode_cache=bytecode),
     )
     templates.env.filters.update(FILTERS)
     templates.env.policies["json.dumps_kwargs"] = {"sort_keys": True, "separators": (",", ":")}
     if not is_source:
-        shown = Shown(load_catalogue(language))
-        templates.env.filters.update(shown.filters)
-        templates.env.globals.update(shown.functions)
+        display = Shown(load_catalogue(language))
+        templates.env.filters.update(display.filters)
+        templates.env.globals.update(display.functions)
         templates.env.globals["script_texts"] = f"/texts/{language}/{script_texts(language)[0]}.json"
     templates.env.globals["conditions"] = CHOICES
     templates.env.globals["plural"] = plural
@@ -131,14 +132,14 @@ TEMPLATES: Final[Mapping[str, Jinja2Templates]] = {
 
 
 def language_of(connection: HTTPConnection) -> str:
-    """The language that who is signed in has chosen, else the browser's."""
+    """Language chosen by the signed-in user, otherwise the browser's."""
     chosen = getattr(connection.state, "language", None)
     return chosen or choose_language(connection.headers.get("accept-language"))
 
 
 def render(
-    request: Request, template: str, context: Mapping[str, Any], status_code: int = 200, **others: Any
+    request: Request, template: str, context: Mapping[str, Any], status_code: int = 200, **options: Any
 ) -> Response:
-    """Render a page in the language of who asks."""
+    """Render a page in the language of the user."""
     templates = TEMPLATES[language_of(request)]
-    return templates.TemplateResponse(request, template, dict(context), status_code=status_code, **others)
+    return templates.TemplateResponse(request, template, dict(context), status_code=status_code, **options)

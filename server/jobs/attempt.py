@@ -1,4 +1,4 @@
-"""What a job may say while it runs, and what it goes on from after an attempt that did not end."""
+"""Progress reports of a running job, and checkpoints from which a later attempt resumes."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Protocol
 
 
 class Say(Protocol):
-    """Tell which stage begins and what share of the job is done, perhaps with a sentence."""
+    """Reports the current stage, the completed fraction of the job and optionally a message."""
 
     def __call__(self, stage: str, share: float, message: str | None = None, /) -> None:
-        """Say it; the newest word within half a second is heard."""
+        """Report progress; only the latest report within half a second is sent."""
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """What a run may say, and what it goes on from.
+    """Interface of one attempt of a job: progress reports and checkpoints.
 
     Parameters
     ----------
-    keep : leaves bytes from which another attempt can go on, should this one end before its time. A job that
-        leaves some may run as long as it likes, and makes way for more urgent ones.
-    checkpoint : what an earlier attempt left, None = nothing.
+    keep : stores a checkpoint from which another attempt can resume. A job with checkpoints has no total time
+        limit, and yields to more urgent jobs.
+    checkpoint : checkpoint of an earlier attempt, None = start from the beginning.
     """
 
     progress: Say

@@ -1,7 +1,8 @@
-"""Jobs on PostgreSQL: procrastinate brings their ids to whichever worker is idle, on any computer.
+"""Jobs on PostgreSQL: procrastinate delivers their ids to idle workers on any computer.
 
-An id is deferred in the transaction that queues the job, so it comes with the commit. The job table stays the
-truth: a delivery only says "look", a second one finds nothing, a lost one is found by the slow poll.
+An id is deferred in the transaction that queues the job, so it is delivered after the commit. The job table
+remains authoritative: a delivery only triggers a look at the table, a duplicate has no effect, and a lost one
+is covered by slow polling.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ FORGET: Final = "*/10 * * * *"
 
 
 class DeliveredQueue(TableQueue):
-    """TableQueue whose jobs are delivered; for a database on PostgreSQL."""
+    """TableQueue with deliveries, for PostgreSQL databases."""
 
     _sender = App(connector=PsycopgConnector())
 
@@ -66,13 +67,13 @@ class DeliveredQueue(TableQueue):
 
 
 class DeliveryLine:
-    """A thread with procrastinate's worker, which takes one delivery and keeps it until the next wait.
+    """Thread that runs procrastinate's worker; it accepts one delivery and holds it until the next wait.
 
-    So a busy worker takes no delivery that an idle one could have.
+    A busy worker therefore accepts no delivery that an idle one could process.
 
     Parameters
     ----------
-    poll_s : longest wait without a delivery, s.
+    poll_s : maximum wait without a delivery, s.
     """
 
     def __init__(self, url: str, poll_s: float) -> None:
@@ -85,11 +86,11 @@ class DeliveryLine:
         self._thread = threading.Thread(target=self._run, name="deliveries", daemon=True)
 
     def start(self) -> None:
-        """Start to take deliveries."""
+        """Start accepting deliveries."""
         self._thread.start()
 
     def wait(self, stop: threading.Event) -> None:
-        """Let go of the last delivery and return at the next, after the slow poll's time, or to stop."""
+        """Release the last delivery; return at the next one, after the polling interval, or to stop."""
         self._let_go()
         until = time.monotonic() + self._poll_s
         while not stop.is_set() and time.monotonic() < until:
@@ -99,13 +100,13 @@ class DeliveryLine:
                 return
 
     def close(self) -> None:
-        """End the thread; what was taken and not begun is found by another worker's slow poll."""
+        """End the thread; accepted but unstarted jobs are picked up by another worker's polling."""
         self._closed.set()
-        told = None
+        cancelled = None
         while self._thread.is_alive():
             running = self._running
-            if running is not None and running is not told:
-                told = running
+            if running is not None and running is not cancelled:
+                cancelled = running
                 with suppress(RuntimeError):  # its loop has just ended
                     running.get_loop().call_soon_threadsafe(running.cancel)
             self._let_go()

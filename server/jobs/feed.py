@@ -1,4 +1,4 @@
-"""Changes of jobs pushed to whoever looks: one loop reads the database for all, browsers never poll.
+"""Job updates pushed to subscribers: one loop reads the database for all, so browsers do not poll.
 
 feed = JobFeed(db)
 async for view in feed.watch(job_id): ...     # the present state first, every change, ends when finished
@@ -26,7 +26,7 @@ INTERVAL_S = 0.2
 
 
 class JobFeed:
-    """In-process broadcaster; the loop lives as long as somebody watches."""
+    """In-process broadcaster; its loop runs while there are subscribers."""
 
     def __init__(self, db: Database) -> None:
         self._db = db
@@ -55,7 +55,7 @@ class JobFeed:
                 del self._watchers[job_id]
 
     def close(self) -> None:
-        """End every watch, so that the server can stop."""
+        """End all subscriptions, so that the server can stop."""
         for mailboxes in self._watchers.values():
             for mailbox in mailboxes:
                 mailbox.put_nowait(None)

@@ -1,4 +1,4 @@
-"""Which queue a database has."""
+"""Selects the queue implementation for a database."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sagittal.server.storage.schema.tables import now
 
 
 def open_queue(db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> TableQueue:
-    """The queue of a database: on PostgreSQL the one whose jobs are delivered."""
+    """Queue of a database: with deliveries on PostgreSQL, otherwise with polling."""
     if isinstance(db.source, str):
         from sagittal.server.jobs.delivered import DeliveredQueue  # an extra
 

@@ -1,9 +1,9 @@
-"""The port every part of the server sees of the jobs, whatever engine stands behind it.
+"""Interface of the job queue, independent of its engine.
 
-    queued → running → done | failed | cancelled          running → queued when its worker died or let go
+    queued → running → done | failed | cancelled          running → queued when its worker died or released it
 
-The job's row is the truth. A worker owns a job through its claim (job, attempt, worker): every write carries
-it as a fence. A write that meets no row means that the job has gone to somebody else: stop, publish nothing.
+The job's row is authoritative. A worker owns a job through its claim (job, attempt, worker), which fences
+every write. A write that matches no row means that another worker owns the job: stop and publish nothing.
 """
 
 from __future__ import annotations
@@ -38,15 +38,15 @@ JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
 @dataclass(frozen=True)
 class JobView:
-    """A piece of work for a worker, as people may see it.
+    """A job as shown to users.
 
     Parameters
     ----------
     state : queued, running, done, failed or cancelled.
-    attempt : attempts so far, without those that were given back unharmed; 0 = none yet.
-    stage, fraction, message : progress of the running attempt, None before its first word; fraction 0 to 1.
-    cancel_requested : somebody asked to stop it; it will within two seconds.
-    error_code, error_message : why it failed, else None.
+    attempt : attempts so far, excluding those that were released; 0 = none yet.
+    stage, fraction, message : progress of the running attempt, None before its first report; fraction 0 to 1.
+    cancel_requested : cancellation was requested; takes effect within two seconds.
+    error_code, error_message : reason of the failure, otherwise None.
     """
 
     id: str
@@ -66,7 +66,7 @@ class JobView:
 
     @property
     def finished(self) -> bool:
-        """Nothing will change any more."""
+        """Whether the job has reached a final state."""
         return self.finished_at is not None
 
 
@@ -77,17 +77,17 @@ VIEW_COLUMNS = tuple(
 
 
 def job_view(row: Row[Any]) -> JobView:
-    """Read a view from a row of VIEW_COLUMNS (further columns are ignored)."""
+    """Build a view from a row of VIEW_COLUMNS (further columns are ignored)."""
     return JobView(**{name: getattr(row, name) for name in JobView.__dataclass_fields__})
 
 
 @dataclass(frozen=True)
 class Claim:
-    """The right of one worker to one attempt; what it may write is fenced by it.
+    """Ownership of one attempt by one worker, which fences its writes.
 
     Parameters
     ----------
-    checkpoint : sha256 of what an earlier attempt kept, None = from the start.
+    checkpoint : sha256 of an earlier attempt's checkpoint, None = start from the beginning.
     """
 
     job_id: str
@@ -101,7 +101,7 @@ class Claim:
 
 
 class Priority(IntEnum):
-    """Which job is claimed first; the smaller."""
+    """Order in which jobs are claimed, smallest first."""
 
     IN_FRONT = -1
     """Somebody waits in front of the screen."""
@@ -111,7 +111,7 @@ class Priority(IntEnum):
 
 
 class LeaseState(Enum):
-    """What a heartbeat found: the job is still ours, makes way, is to be stopped, or is somebody else's."""
+    """Result of a heartbeat: still owned, should yield, should be cancelled, or lost to another worker."""
 
     OURS = "ours"
     YIELD = "yield"
@@ -121,7 +121,7 @@ class LeaseState(Enum):
 
 
 class JobQueue(Protocol):
-    """What the server needs of any queue engine; False from a fenced write = the claim is lost."""
+    """Operations required of a queue engine; False from a fenced write = the claim is lost."""
 
     def submit(
         self,
@@ -134,52 +134,54 @@ class JobQueue(Protocol):
         requested_by: str | None = None,
         priority: Priority = Priority.USUAL,
     ) -> JobView:
-        """Queue a job in the caller's transaction, or return the live or successful one of the same key."""
+        """Queue a job in the caller's transaction, or return the pending or successful one with the
+        same key.
+        """
 
     def get(self, job_id: str) -> JobView | None:
         """Read one job."""
 
     def cancel(self, c: Connection, job_id: str) -> JobView | None:
-        """Stop a job: at once if queued, through its worker if running; a finished one stays as it is."""
+        """Cancel a job: at once if queued, through its worker if running; no effect if finished."""
 
     def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
-        """Take the next job of these kinds, if there is one."""
+        """Claim the next job of these kinds, if any."""
 
     def heartbeat(self, claim: Claim) -> LeaseState:
         """Renew the lease."""
 
     def look(self, claim: Claim) -> LeaseState:
-        """Ask whether the job is still ours, without renewing anything."""
+        """State of the lease, without renewing it."""
 
     def progress(self, claim: Claim, stage: str, fraction: float, message: str | None = None) -> bool:
-        """Say how far the attempt is."""
+        """Report the progress of an attempt."""
 
     def keep(self, claim: Claim, sha256: str, require: Publish) -> str | None:
-        """Keep a checkpoint that `require` finds stored, and forgive deaths until now.
+        """Register a checkpoint that `require` confirms as stored, and reset the count of crashes.
 
         Returns
         -------
-        The checkpoint that no longer refers to anything: the earlier one, `sha256` itself when the claim is
-        lost, None when there is none.
+        The checkpoint that became unreferenced: the previous one, `sha256` itself if the claim is lost,
+        or None.
         """
 
     def finish(self, claim: Claim, publish: Publish) -> bool:
-        """Publish and mark done in one transaction; refused also after a request to cancel."""
+        """Publish and mark done in one transaction; refused also after a cancel request."""
 
     def fail(self, claim: Claim, code: str, message: str) -> bool:
-        """End the job with a reason."""
+        """Mark the job failed with a reason."""
 
     def stop(self, claim: Claim) -> bool:
-        """Confirm a requested cancel."""
+        """Confirm a requested cancellation."""
 
     def note_death(self, claim: Claim) -> bool:
-        """Report that the attempt ended without a word: run again, the third time give up."""
+        """Record that the worker crashed; the job is retried, and fails at the third crash."""
 
     def release(self, claim: Claim) -> bool:
-        """Give the job back unharmed: the worker shuts down, or its files cannot be reached now.
+        """Return the job to the queue: the worker shuts down, or its files are temporarily unavailable.
 
-        It does not count as an attempt of the job.
+        The attempt is not counted.
         """
 
     def listen(self) -> AbstractContextManager[Wait]:
-        """While the block runs, an idle worker can wait for a job that may be claimed."""
+        """Context in which an idle worker can wait for claimable jobs."""

@@ -1,7 +1,7 @@
-"""The embedded queue: the job table itself, claimed by the workers of `sagittal serve`.
+"""Embedded queue: the job table, claimed by the workers of `sagittal serve`.
 
-Three silent deaths on one job end it (a poisonous recording must not loop). A lease in the far future is
-taken for a dead one: the clock was set back; the fence keeps a mistake in that harmless.
+A job whose worker crashes three times fails, so that a malformed recording cannot loop. A lease far in the
+future is treated as expired, since the clock was set back; fencing makes a wrong decision harmless.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class TableQueue:
 
     Parameters
     ----------
-    lease_s : a claim that has not been renewed for so long is dead.
-    clock : aware UTC now, replaced in tests.
+    lease_s : time without renewal after which a claim expires.
+    clock : returns the current UTC time, replaced in tests.
     """
 
     def __init__(self, db: Database, lease_s: float, clock: Callable[[], dt.datetime] = now) -> None:
@@ -68,9 +68,9 @@ class TableQueue:
     ) -> JobView:
         """See JobQueue."""
         same = and_(job.c.key == key, job.c.state.in_((*ACTIVE_STATES, "done")), ~job.c.cancel_requested)
-        found = c.execute(select(*VIEW_COLUMNS).where(same)).first()
-        if found:
-            return job_view(found)
+        row = c.execute(select(*VIEW_COLUMNS).where(same)).first()
+        if row:
+            return job_view(row)
         # one that is being cancelled still holds the key; it is not the one that was asked for now
         c.execute(
             update(job)
@@ -97,8 +97,8 @@ class TableQueue:
 
     def get(self, job_id: str) -> JobView | None:
         """See JobQueue."""
-        found = self._db.ask(select(*VIEW_COLUMNS).where(job.c.id == job_id))
-        return job_view(found[0]) if found else None
+        rows = self._db.ask(select(*VIEW_COLUMNS).where(job.c.id == job_id))
+        return job_view(rows[0]) if rows else None
 
     def cancel(self, c: Connection, job_id: str) -> JobView | None:
         """See JobQueue."""
@@ -113,7 +113,7 @@ class TableQueue:
         return job_view(row) if row else None
 
     def claim(self, worker: str, kinds: Collection[str]) -> Claim | None:
-        """See JobQueue; an idle worker only reads, so it does not stand in the way of writers."""
+        """See JobQueue; an idle worker only reads, so it does not block writers."""
         time = self._clock()
         claimable = and_(job.c.state == "queued", job.c.kind.in_(kinds))
         if not self._db.ask(select(job.c.seq).where(or_(claimable, self._dead(time))).limit(1)):
@@ -128,7 +128,7 @@ class TableQueue:
                 .with_for_update(skip_locked=True)
                 .scalar_subquery()
             )
-            taken = (
+            claimed = (
                 update(job)
                 .where(job.c.seq == first)
                 .values(
@@ -143,11 +143,11 @@ class TableQueue:
                 )
                 .returning(*_CLAIMED)
             )
-            row = c.execute(taken).first()
+            row = c.execute(claimed).first()
         if row is None:
             return None
-        job_id, attempt, *rest = row
-        return Claim(job_id, attempt, worker, *rest)
+        job_id, attempt, *claim_values = row
+        return Claim(job_id, attempt, worker, *claim_values)
 
     def heartbeat(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
@@ -159,10 +159,10 @@ class TableQueue:
 
     def look(self, claim: Claim) -> LeaseState:
         """See JobQueue."""
-        found = self._db.ask(select(job.c.cancel_requested, job.c.priority).where(_fence(claim)))
-        if not found:
+        rows = self._db.ask(select(job.c.cancel_requested, job.c.priority).where(_fence(claim)))
+        if not rows:
             return LeaseState.LOST
-        [row] = found
+        [row] = rows
         if row.cancel_requested:
             return LeaseState.CANCEL
         if row.priority < Priority.BEHIND:
@@ -223,11 +223,11 @@ class TableQueue:
 
     @contextmanager
     def listen(self) -> Iterator[Wait]:
-        """See JobQueue; the table is looked at again and again."""
+        """See JobQueue; polls the table."""
         yield lambda stop: stop.wait(POLL_S)
 
     def _announce(self, c: Connection, job_id: str) -> None:
-        """Tell idle workers of a job that waits, with the commit; here they look for themselves."""
+        """Notify idle workers of a queued job on commit; a no-op here, since they poll."""
 
     def _fenced(self, claim: Claim, **values: object) -> bool:
         with self._db.write() as c:
@@ -242,7 +242,7 @@ class TableQueue:
         return and_(job.c.state == "running", expired)
 
     def _bury(self, c: Connection, which: ColumnElement[bool]) -> int:
-        """Count a death of running jobs: cancel if that was wanted, give up at the third, else requeue."""
+        """Count a crash of running jobs: cancel if requested, fail at the third, otherwise requeue."""
         buried = 0
         for row in c.execute(select(job.c.seq, job.c.deaths, job.c.cancel_requested).where(which)).all():
             values: dict[str, object] = {"deaths": row.deaths + 1}

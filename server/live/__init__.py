@@ -1,1 +1,1 @@
-"""Live takes: the tablet's stream onto the disk, the estimate beside it, the browsers that watch."""
+"""Live trials: recording of the tablet's stream, real-time estimation, and updates for browsers."""

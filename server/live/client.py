@@ -1,6 +1,7 @@
-"""A client of the live protocol: keeps every batch until it is acknowledged, resumes, finishes with a hash.
+"""Client of the live protocol: buffers batches until acknowledged, resumes, and finishes with a hash.
 
-What a tablet's page does in JavaScript, for `sagittal replay`, the demo, tests and load generators.
+Python counterpart of the tablet page's JavaScript, for `sagittal replay`, the demo, tests and load
+generators.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ async def stream(
     seed: int | None = None,
     report: StreamReport | None = None,
 ) -> StreamReport:
-    """Stream a take and finish it.
+    """Stream a trial and finish it.
 
     Parameters
     ----------
-    url : of the socket, ws:// or wss://. frames : encoded batches, seq from 0; their pace is the sender's.
-    patience_s : longest time without an acknowledgement while there is something to acknowledge.
+    url : of the socket, ws:// or wss://. frames : encoded batches, seq from 0; the sender sets their pace.
+    patience_s : timeout without an acknowledgement while batches are unacknowledged.
     hear : called with the server's commands and states. seed : of the faults.
-    report : filled while it streams, for those who watch.
+    report : updated during streaming, for observers.
 
     Raises
     ------
@@ -75,7 +76,7 @@ async def stream(
 async def _until_finished(sender: Sender, url: str, patience_s: float) -> None:
     pause, trouble = FIRST_PAUSE_S, ""
     while not sender.finished:
-        before = sender.progress
+        progress_before = sender.progress
         try:
             async with connect(
                 url,
@@ -103,7 +104,7 @@ async def _until_finished(sender: Sender, url: str, patience_s: float) -> None:
             trouble = str(error) or type(error).__name__
         if sender.finished:
             return
-        if sender.progress > before:
+        if sender.progress > progress_before:
             pause = FIRST_PAUSE_S
         elif time.monotonic() - sender.progressed_at > patience_s:
             raise LiveError(

@@ -1,6 +1,6 @@
-"""One thread that writes the logs of all takes and has them synced, so that no disk holds up the event loop.
+"""Thread that writes and syncs the logs of all live trials, so that disk access never blocks the event loop.
 
-Records are written as soon as they come, so that the estimator can read them, and synced in groups at most
+Records are written immediately, so that the estimator can read them, and synced in groups at most
 `INTERVAL_S` after the first of them: a sync costs milliseconds whatever its size, an acknowledgement that
 comes without one is worth nothing (measured: 109 acknowledged batches lost in 8 kills; with it none).
 """
@@ -40,16 +40,16 @@ Post = Callable[[Callable[[Any], None], Any], None]
 
 
 class LoopMailbox:
-    """Calls to make on an event loop, many of them with one wake-up; may be posted from any thread."""
+    """Thread-safe queue of calls on an event loop, which processes many per wake-up."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.loop = loop
         self._calls: deque[tuple[Callable[[Any], None], Any]] = deque()
         self._under_way = False
 
-    def post(self, what: Callable[[Any], None], value: object) -> None:
-        """Have `what(value)` called on the loop, after all that was posted before."""
-        self._calls.append((what, value))
+    def post(self, callback: Callable[[Any], None], value: object) -> None:
+        """Call `what(value)` on the loop, after everything posted earlier."""
+        self._calls.append((callback, value))
         if not self._under_way:
             self._under_way = True
             with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to be told
@@ -59,31 +59,31 @@ class LoopMailbox:
         # before the first is taken: what is posted from here on is taken too, or wakes the loop again
         self._under_way = False
         while self._calls:
-            what, value = self._calls.popleft()
-            what(value)
+            callback, value = self._calls.popleft()
+            callback(value)
 
 
 class LaneOwner(Protocol):
-    """Who is told about a lane; all calls are posted to the event loop, in the order they happened."""
+    """Callbacks for events of a lane, posted to the event loop in order."""
 
     def note_written(self, size: int) -> None:
-        """The log has `size` bytes that can be read."""
+        """The log has `size` readable bytes."""
 
     def note_synced(self, records: int) -> None:
-        """The first `records` records put into the lane survive a power cut."""
+        """The first `records` records put into the lane are durable."""
 
     def note_failure(self, error: OSError) -> None:
-        """The disk refused; nothing more is written until the lane is mended."""
+        """A disk error occurred; nothing more is written until the lane is mended."""
 
 
 class LogLane:
-    """One log and the records on their way to it.
+    """One log and its queue of records.
 
-    The event loop only puts records in; everything else touches the disk and belongs into a thread.
+    The event loop only adds records; all other methods access the disk and must run in a thread.
 
     Parameters
     ----------
-    log : owned by the lane from now on. owner : told what happens. disk : of all lanes, reports failures.
+    log : owned by the lane. owner : receives callbacks. disk : shared reporter of failures.
     """
 
     def __init__(self, log: TakeLog, owner: LaneOwner, post: Post, disk: DiskLog) -> None:
@@ -96,11 +96,11 @@ class LogLane:
         self._synced = 0
 
     def put(self, record: bytes) -> None:
-        """Queue one record; never waits."""
+        """Queue one record; never blocks."""
         self._queue.append(record)
 
     def write(self) -> bool:
-        """Write what is queued; whether anything waits for a sync now."""
+        """Write queued records; return whether a sync is required."""
         with self._lock:
             records = [self._queue.popleft() for _ in range(len(self._queue))]
             if records and not self._broken:
@@ -115,7 +115,7 @@ class LogLane:
             return self._written > self._synced and not self._broken
 
     def sync(self) -> None:
-        """Sync what is written."""
+        """Sync written records."""
         with self._lock:
             if self._broken or self._written == self._synced:
                 return
@@ -130,10 +130,10 @@ class LogLane:
                 self._post(self._owner.note_synced, self._synced)
 
     def mend(self) -> None:
-        """Go back to what was synced and count records anew; OSError when the disk still refuses.
+        """Truncate to the synced part and restart the count of records; OSError if the disk still fails.
 
-        After a failed sync nobody knows which pages reached the disk, and a second sync would not say so
-        (the kernel has marked them clean), so what was not synced is cut off and has to be sent again.
+        After a failed sync it is unknown which pages reached the disk, and a second sync would not report it
+        (the kernel has marked them clean), so unsynced records are dropped and must be sent again.
         """
         with self._lock:
             self._queue.clear()
@@ -142,7 +142,7 @@ class LogLane:
             self._broken = False
 
     def close(self) -> None:
-        """Write and sync what is there, then let go of the log."""
+        """Write and sync queued records, then close the log."""
         self.write()
         self.sync()
         with self._lock:
@@ -150,7 +150,7 @@ class LogLane:
             self.log.close()
 
     def _break(self, error: Exception) -> None:
-        """Whatever it is (no memory, a mistake of ours): this take says so, the others go on."""
+        """Stop this trial's log on any error (out of memory, a bug); other lanes continue."""
         self._broken = True
         self._post(
             self._owner.note_failure, error if isinstance(error, OSError) else OSError(errno.EIO, str(error))
@@ -158,11 +158,11 @@ class LogLane:
 
 
 class Committer:
-    """The thread; lanes make themselves known by waking it.
+    """Thread that writes the lanes that wake it.
 
     Parameters
     ----------
-    interval_s : longest time a written record waits for its group to be synced.
+    interval_s : maximum delay before a written record is synced with its group.
     """
 
     def __init__(self, interval_s: float = INTERVAL_S) -> None:
@@ -182,7 +182,7 @@ class Committer:
         self._thread.start()
 
     def stop(self) -> None:
-        """Write and sync what has been put in, then end the thread."""
+        """Write and sync all queued records, then end the thread."""
         self._stopping = True
         self._work.set()
         if self._thread is not None:
@@ -190,25 +190,25 @@ class Committer:
         self._syncers.shutdown()
 
     def post_to(self, loop: asyncio.AbstractEventLoop) -> Post:
-        """The way to an event loop, one for all lanes of it."""
+        """Mailbox of an event loop, shared by all its lanes."""
         if self._letters is None or self._letters.loop is not loop:
             self._letters = LoopMailbox(loop)
         return self._letters.post
 
     def wake(self, lane: LogLane) -> None:
-        """Say that a lane has something to write; never waits."""
+        """Schedule a lane for writing; never blocks."""
         self._woken.append(lane)
         self._work.set()
 
     def write(self) -> None:
-        """Write what the woken lanes hold."""
+        """Write the queued records of all scheduled lanes."""
         for _ in range(len(self._woken)):
             lane = self._woken.popleft()
             if lane.write():
                 self._dirty[lane] = None
 
     def sync(self) -> None:
-        """Sync all lanes; what comes meanwhile is written."""
+        """Sync all lanes, writing new records in the meantime."""
         lanes, self._dirty = self._dirty, {}
         if len(lanes) == 1:
             next(iter(lanes)).sync()

@@ -1,7 +1,7 @@
-"""The steps after the end of a take is on the disk; each may be the last before a crash.
+"""Crash-safe steps after the end of a live trial is on disk.
 
-The row says that it is over, the log becomes a recording, the tablet hears of it, the estimator is heard out,
-the log goes (services/live_recordings.py takes up at the next start what is left).
+Mark the row as ended, store the log as a recording, notify the tablet, wait for the estimator's last results,
+remove the log (services/live_recordings.py completes pending steps at the next start).
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ AGAIN_S: Final = 30.0
 
 
 class Ending:
-    """Takes that are just ending.
+    """Live trials in the process of ending.
 
     Parameters
     ----------
-    over : called with the row of a take that is over.
+    over : called with the row of an ended trial.
     """
 
     def __init__(
@@ -65,19 +65,19 @@ class Ending:
         self._draining: dict[str, ActiveTake] = {}
 
     def ask(self, take: ActiveTake, actor: audit.Actor | None) -> None:
-        """Note that somebody (None: the program) ends this take here, not the tablet."""
+        """Register a user (None: the program) who ends this trial here instead of on the tablet."""
         self._asked[take.id] = actor
 
     def unask(self, take: ActiveTake) -> None:
-        """Take the wish back, since the take could not be ended."""
+        """Withdraw the request, since the trial could not be ended."""
         del self._asked[take.id]
 
     def draining(self, take_id: str) -> ActiveTake | None:
-        """A take that is over and whose estimator still speaks."""
+        """An ended trial whose estimator still delivers results."""
         return self._draining.get(take_id)
 
     async def refuse_erased(self, take: ActiveTake) -> None:
-        """Raise NotFound where a take was erased just before its log was there, which goes too."""
+        """Raise NotFound and remove the log if the trial was erased just before its log was created."""
         try:
             await asyncio.to_thread(self._rows.take, take.id)
         except NotFound:
@@ -86,20 +86,20 @@ class Ending:
             raise
 
     async def complete(self, take: ActiveTake, end: TakeEnd, forget: Callable[[], None]) -> None:
-        """Take all steps; `forget` is called once the take is over in the database."""
-        here = take.id in self._asked
+        """Carry out all steps; `forget` is called once the trial has ended in the database."""
+        is_local = take.id in self._asked
         actor = self._asked.pop(take.id, None)
         try:
             with contextlib.suppress(NotFound):
                 await asyncio.to_thread(self._journal.write)
-                state = "closed" if here else "finished"
+                state = "closed" if is_local else "finished"
                 await asyncio.to_thread(self._rows.end, actor, take.id, state, end)
             self._draining[take.id] = take
             forget()
             await take.recorder.close()
             take.problem = end.problem
             take.recording_id = await self._store(take.id)
-            self._tell(take, here)
+            self._tell(take, is_local)
             with contextlib.suppress(NotFound):
                 self._over(await asyncio.to_thread(self._rows.take, take.id))
             take.over.set()
@@ -113,29 +113,29 @@ class Ending:
             self._draining.pop(take.id, None)
             self._pool.leave(take.id)
 
-    def _tell(self, take: ActiveTake, here: bool) -> None:
+    def _tell(self, take: ActiveTake, is_local: bool) -> None:
         if take.tablet is None:
             return
         if take.recording_id is not None:
             take.tablet.say(protocol.announce_finish(take.recording_id, take.problem))
-        if here or take.recording_id is None:
+        if is_local or take.recording_id is None:
             take.tablet.shut(CloseCode.ENDED, "take_ended")
 
     async def _store(self, take_id: str) -> str | None:
-        """Store until it works: the log holds acknowledged samples."""
+        """Retry until the log is stored, as it contains acknowledged samples."""
         path = live_recordings.log_path(self._settings.live, take_id)
         while True:
             try:
-                kept = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
+                recording_id = await asyncio.to_thread(live_recordings.keep, *self._keep, path)
             except Exception as error:  # noqa: BLE001 - logged, whatever it is
                 self._disk.note_refusal(error, f"live take {take_id}")
             else:
                 self._disk.note_success()
-                return kept
+                return recording_id
             await asyncio.sleep(AGAIN_S)
 
     async def _drain(self, take: ActiveTake) -> None:
-        """Hear the estimator out: the last strides and cues are still on their way."""
+        """Wait for the estimator's last strides and cues."""
         if self._pool.follows(take.id) and take.estimate != "failed":
             with contextlib.suppress(TimeoutError):
                 async with asyncio.timeout(DRAIN_S):

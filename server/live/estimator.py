@@ -1,4 +1,4 @@
-"""An estimator process: follows many takes, holds no connection to the database, ends with its parent.
+"""Estimator process: processes many live trials without access to the database; ends with its parent.
 
 Started by server/live/pool.py as `python -m sagittal.server.live.estimator <socket> <parent pid>`.
 """
@@ -35,7 +35,7 @@ log = logging.getLogger("sagittal.server.live.estimator")
 
 
 class EstimatorWorker:
-    """The takes of this process; one that throws is given up, the others go on."""
+    """The live trials of this process; one that raises is dropped without affecting the others."""
 
     def __init__(self, say: Callable[[Report], None]) -> None:
         self._say = say
@@ -43,16 +43,16 @@ class EstimatorWorker:
 
     @property
     def has_work(self) -> bool:
-        """Whether some log is longer than what was read."""
+        """Whether any log has unread data."""
         return any(take.has_work for take in self._takes.values())
 
     @property
     def due_at(self) -> float | None:
-        """When the next picture is due."""
+        """Time of the next picture."""
         return min((due for t in self._takes.values() if (due := t.due_at) is not None), default=None)
 
     def obey(self, order: Order) -> None:
-        """Take one order; about a take that was given up there is nothing to do."""
+        """Carry out one order; orders for dropped trials are ignored."""
         match order:
             case FollowTake():
                 self._drop(order.take)
@@ -69,7 +69,7 @@ class EstimatorWorker:
                 self._drop(order.take)
 
     def work(self) -> None:
-        """Let every take read once and show what is due."""
+        """Process one part of each log and send due pictures."""
         for name, take in list(self._takes.items()):
             if take.has_work:
                 self._guarded(name, take.step)
@@ -84,9 +84,9 @@ class EstimatorWorker:
         self._takes[order.take] = Follower(order, self._say)
 
     def _drop(self, take: str) -> None:
-        found = self._takes.pop(take, None)
-        if found is not None:
-            found.close()
+        follower = self._takes.pop(take, None)
+        if follower is not None:
+            follower.close()
 
     def _guarded(self, take: str, action: Callable[[], None]) -> None:
         try:
@@ -97,12 +97,12 @@ class EstimatorWorker:
             if not isinstance(error, SagittalError):
                 log.exception("the estimate of live take %s failed", take)
             self._drop(take)
-            said = follower.describe_failure(error)
-            self._say(EstimateFailed(take, said.code, said.message))
+            notice = follower.describe_failure(error)
+            self._say(EstimateFailed(take, notice.code, notice.message))
 
 
 def main() -> None:
-    """Follow takes until the web process closes the socket."""
+    """Process trials until the web process closes the socket."""
     line, _ = enter_child()
     compile_kernels()
     gc.collect()
@@ -115,7 +115,7 @@ def main() -> None:
 
 
 def follow(line: Channel) -> None:
-    """Read orders and logs in turn; raises EOFError when the other side has gone."""
+    """Alternate between orders and logs; raises EOFError if the peer has closed."""
     estimator = EstimatorWorker(lambda report: line.send(encode(report)))
     # one poll object for all: this is asked hundreds of times a second
     orders = select.poll()
@@ -133,7 +133,7 @@ def follow(line: Channel) -> None:
 
 
 def compile_kernels() -> None:
-    """Compile the kernels or load them from the cache, before a patient stands there."""
+    """Compile the kernels or load them from the cache, before the first trial."""
     from sagittal.core.online import compile_live_kernels
     from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 

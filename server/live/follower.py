@@ -1,7 +1,7 @@
-"""One take in an estimator process: reads its log from the start, estimates, gives feedback, tells.
+"""One live trial in an estimator process: read its log, estimate, give feedback and report.
 
-All of it but the pictures' timing is a function of the log and the commands, batch by batch in their order: a
-process that takes over from a dead one says the same strides and cues again, with the same numbers.
+Apart from the timing of pictures, results depend only on the log and the commands, batch by batch in
+order: a process that replaces a crashed one reproduces the same strides and cues with the same numbers.
 """
 
 from __future__ import annotations
@@ -60,11 +60,11 @@ PICTURE_TRAILS: Final = 400
 
 
 class Follower:
-    """A take.
+    """One live trial.
 
     Parameters
     ----------
-    say : sends one report. clock : monotonic seconds, the same clock as the web process's.
+    say : sends one report. clock : monotonic seconds, same clock as in the web process.
     """
 
     def __init__(
@@ -101,47 +101,47 @@ class Follower:
 
     @property
     def has_work(self) -> bool:
-        """Whether the log is longer than what was read."""
+        """Whether the log has unread data."""
         return self._read < self._size
 
     @property
     def due_at(self) -> float | None:
-        """When the next picture is to be sent; None = nothing new to show."""
+        """Time of the next picture; None = nothing new to show."""
         return None if self._last is None else self._sent_at + EVERY_S
 
-    def grow(self, size: int, at: float) -> None:
-        """The log has `size` bytes since `at`."""
+    def grow(self, size: int, time: float) -> None:
+        """Register a log size of `size` bytes at `time`."""
         self._size = size
-        self._arrived.append((size, at))
+        self._arrived.append((size, time))
 
     def command(self, command: Command) -> None:
-        """Carry out a command before the batch it names."""
+        """Schedule a command before the batch it refers to."""
         self._commands.append(command)
         self._obey()
 
     def charge(self, percent: Mapping[str, float]) -> None:
-        """Show the battery of some sensors."""
+        """Update the battery levels of some sensors."""
         self._battery = {**self._battery, **percent}
 
     def step(self) -> None:
-        """Read and estimate the next part of the log; raises InputError live_log_gone."""
+        """Read and process the next part of the log; raises InputError live_log_gone."""
         if self._file is None:
             self._file = _open_log(self._begin.path)
         self._file.seek(self._read)
         data = self._file.read(min(CHUNK_BYTES, self._size - self._read))
-        found, used = scan(data) if self._read == 0 else scan_records(data)
+        records, used = scan(data) if self._read == 0 else scan_records(data)
         if not used and len(data) >= CHUNK_BYTES:  # a record longer than a chunk
             data += self._file.read(self._size - self._read - len(data))
-            found, used = scan(data) if self._read == 0 else scan_records(data)
+            records, used = scan(data) if self._read == 0 else scan_records(data)
         if not used:
             raise ValueError(f"the log cannot be read from byte {self._read} on")
         start = self._read
-        for record in found:
+        for record in records:
             self._use(record, start + record.end)
         self._read = start + used
 
     def show(self) -> None:
-        """Send a picture of the newest frame, if it is time."""
+        """Send a picture of the latest frame if due."""
         due, now = self.due_at, self._clock()
         if due is None or now < due or self._last is None:
             return
@@ -156,20 +156,20 @@ class Follower:
         delay = None if self._late else self._delays.now(now)
         guided = self._guided
         say = None if guided is None else tell_person(guided.protocol, guided.phase)
-        pose, seen = wire.pose(frame), self._read
-        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, seen, pose, say))
+        pose, read_bytes = wire.pose(frame), self._read
+        self._say(Picture(self.take, frame.t_s, frame.seq, frame.stage, body, delay, read_bytes, pose, say))
         self._last = None
         self._trail.clear()
         self._sent_at = now
 
     def _describe(self, view: CalibrationView | None) -> msgspec.Raw:
-        """Where calibration stands, put into words once while nothing of it is new."""
+        """Calibration state as JSON, cached while unchanged."""
         if self._described is None or self._described[0] is not view:
             self._described = view, wire.describe_calibration(view)
         return self._described[1]
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the log file."""
         if self._file is not None:
             self._file.close()
 
@@ -199,7 +199,7 @@ class Follower:
             self._say(LogProcessed(self.take))
 
     def _obey(self) -> None:
-        """Carry out the commands whose batch is the next one."""
+        """Carry out the commands that precede the next batch."""
         while self._online is not None and self._commands and self._commands[0].before <= self._next_seq:
             command = self._commands.popleft()
             if command.name == "redo_calibration":
@@ -255,7 +255,7 @@ class Follower:
         self._said[kind] += 1
 
     def _note_arrival(self, batch: SampleBatch, end: int) -> None:
-        """Find out whether this batch is fresh; what was in the log before we came is not."""
+        """Determine whether this batch is up to date; data logged before the process started are not."""
         if end <= self._begin.size:
             self._late = True
             return
@@ -268,20 +268,20 @@ class Follower:
 
 
 class _Delays:
-    """How long ago the last sample was due: since the fastest way here that was seen, per device clock."""
+    """Delay of the latest sample, relative to the fastest transmission observed, per device clock."""
 
     def __init__(self) -> None:
         self._fastest: dict[int, tuple[float, float]] = {}
         self._due: float | None = None
 
-    def arrived(self, batch: SampleBatch, rate_hz: float, at: float) -> None:
+    def arrived(self, batch: SampleBatch, rate_hz: float, time: float) -> None:
         n = len(batch.samples)
         last = (n - 1) / rate_hz if batch.offsets_us is None else float(batch.offsets_us[-1]) * 1e-6
         sampled = batch.t0_us * 1e-6 + last
-        way = at - sampled
-        before, when = self._fastest.get(batch.stream, (way, at))
-        fastest = min(way, before + DRIFT * (at - when))
-        self._fastest[batch.stream] = (fastest, at)
+        way = time - sampled
+        previous, when = self._fastest.get(batch.stream, (way, time))
+        fastest = min(way, previous + DRIFT * (time - when))
+        self._fastest[batch.stream] = (fastest, time)
         self._due = sampled + fastest
 
     def now(self, now: float) -> float | None:
@@ -289,7 +289,7 @@ class _Delays:
 
 
 class _Phase:
-    """Where in its cycle each foot is, by its last contact and the length of its last stride."""
+    """Phase of each foot in its cycle, from its last contact and stride duration."""
 
     def __init__(self) -> None:
         self._contact: dict[Side, float] = {}
@@ -303,13 +303,13 @@ class _Phase:
         self._length[stride.side] = stride.end_s - stride.start_s
 
     def at(self, t_s: float) -> dict[Side, float | None]:
-        found: dict[Side, float | None] = {}
+        phases: dict[Side, float | None] = {}
         for side in SIDES:
             contact, length = self._contact.get(side), self._length.get(side)
             share = None if contact is None or not length else 100.0 * (t_s - contact) / length
             # half a cycle too late: the person has stopped
-            found[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
-        return found
+            phases[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
+        return phases
 
 
 def _open_log(path: str) -> BinaryIO:
@@ -334,7 +334,7 @@ def _protocol(name: str) -> Protocol:
 
 
 def describe_failure(error: Exception) -> Notice:
-    """What is said of a take whose estimate threw; what core itself refuses it says why."""
+    """Notice for a failed estimate; errors raised by core include their reason."""
     if isinstance(error, SagittalError):
         return Notice(error.code, error.message, severity="error")
     return Notice(

@@ -1,7 +1,7 @@
-"""All live takes of this server: who streams, who watches, who estimates, and what is kept of it.
+"""Registry of all live trials of this server: tablets, browsers, estimators and events.
 
-One per web process, on its event loop. Whatever waits for disk or database does so in a thread. At start it
-finishes what a crash left, opens the logs of takes that are still open and waits for their tablets.
+One per web process, on its event loop; disk and database access runs in threads. At start it completes
+interrupted work, opens the logs of unfinished trials and waits for their tablets.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
 
 
 class Hub:
-    """Registry of all running takes and of who watches them."""
+    """Registry of running trials and their viewers."""
 
     def __init__(
         self, settings: Settings, db: Database, reviewed: ReviewedAnalyses, queue: JobQueue, nodes: Nodes
@@ -83,11 +83,11 @@ class Hub:
 
     @property
     def owner(self) -> live.TakeOwner:
-        """This web server as the owner of takes."""
+        """This web server as the owner of trials."""
         return live.TakeOwner(self.nodes.name, self.nodes.run)
 
     async def start(self) -> None:
-        """Warm the estimators, finish what a crash left and open the takes that are still open."""
+        """Warm up the estimators, complete interrupted work and open unfinished trials."""
         self._loop = asyncio.get_running_loop()
         # getting warm takes seconds, with new filters half a minute: not while somebody walks already
         self.pool.start()
@@ -107,7 +107,7 @@ class Hub:
             self._ticking.append(asyncio.create_task(self._mind_rows()))
 
     async def stop(self) -> None:
-        """Acknowledge what has come, send the tablets away (they come back), end the estimators."""
+        """Acknowledge received data, disconnect the tablets (they reconnect), end the estimators."""
         for ticking in self._ticking:
             ticking.cancel()
         if self._tasks:
@@ -129,7 +129,7 @@ class Hub:
     # the tablet
 
     async def enter(self, row: live.LiveTakeRecord, hello: Hello | None) -> ActiveTake:
-        """The open take of a tablet, with its log; raises ProtocolError, InputError, NodeAway, NotFound."""
+        """The open trial of a tablet, with its log; raises ProtocolError, InputError, NodeAway, NotFound."""
         async with self._entering:
             take = self._takes.get(row.id)
             if take is not None:
@@ -158,7 +158,7 @@ class Hub:
         return take
 
     def attach(self, take: ActiveTake, tablet: TabletLink) -> None:
-        """A tablet has been greeted; one that was there before is sent away."""
+        """Attach a greeted tablet, disconnecting an earlier one."""
         if take.tablet is not None:
             take.tablet.shut(CloseCode.REPLACED, "replaced")
         take.tablet = tablet
@@ -166,7 +166,7 @@ class Hub:
         self.tell_state(take)
 
     def detach(self, take: ActiveTake, tablet: TabletLink) -> None:
-        """Forget a tablet that has gone."""
+        """Detach a disconnected tablet."""
         if take.tablet is tablet:
             take.tablet = None
             self.tell_state(take)
@@ -176,11 +176,11 @@ class Hub:
     async def command(
         self, actor: audit.Actor | None, session_id: str, name: str, value: Any, at_s: float | None = None
     ) -> dict[str, Any]:
-        """Carry a command out, keep it, and return the state; raises Conflict, NodeAway, ServiceError.
+        """Carry out and store a command; return the state; raises Conflict, NodeAway, ServiceError.
 
         Parameters
         ----------
-        at_s : the moment a mark means, which is before its words are written; never after the newest sample.
+        at_s : time of a mark, which precedes entering its text; clipped to the latest sample.
         """
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
@@ -205,9 +205,9 @@ class Hub:
         return take.standing()
 
     async def close(self, actor: audit.Actor | None, session_id: str) -> live.LiveTakeRecord:
-        """End a take without the tablet; what has come becomes the recording; raises Conflict.
+        """End a trial without the tablet; received data become the recording; raises Conflict.
 
-        One of a web server that is away is over here, too; that one stores what it has when it is back.
+        A trial of an unavailable web server ends as well; that server stores its data when it is back.
         """
         row = await asyncio.to_thread(self.rows.open_take, session_id)
         take = self._takes.get(row.id)
@@ -225,12 +225,12 @@ class Hub:
         return await asyncio.to_thread(self.rows.take, row.id)
 
     def drop_from_thread(self, session_ids: list[str]) -> None:
-        """As `drop`, from a thread that answers a request; blocks until done."""
+        """Call `drop` from a request thread and wait for it."""
         if self._loop is not None and any(t.session_id in session_ids for t in tuple(self._takes.values())):
             asyncio.run_coroutine_threadsafe(self.drop(session_ids), self._loop).result()
 
     async def drop(self, session_ids: list[str]) -> None:
-        """Let go of takes whose session is about to be erased."""
+        """Release trials whose session is about to be erased."""
         for take in [t for t in self._takes.values() if t.session_id in session_ids]:
             await self._let_go(take)
 
@@ -244,37 +244,37 @@ class Hub:
     # browsers
 
     def room(self, session_id: str) -> Room:
-        """Who watches a session."""
+        """Viewers of a session."""
         return self._rooms.setdefault(session_id, Room())
 
     def leave(self, session_id: str) -> None:
-        """A browser has gone; forget the room when it was the last and nothing streams."""
+        """Remove a browser, and the room if it is empty and nothing is streaming."""
         room = self._rooms.get(session_id)
         if room is not None and room.is_empty and self.take_of(session_id) is None:
             del self._rooms[session_id]
 
     def take_of(self, session_id: str) -> ActiveTake | None:
-        """The session's take that a tablet has joined, None when there is none."""
+        """The session's trial with a tablet, None if there is none."""
         return next((t for t in tuple(self._takes.values()) if t.session_id == session_id), None)
 
     def standing(self, session_id: str) -> dict[str, Any]:
-        """The state of a session's newest take for the browsers; blocks."""
+        """State of a session's latest trial for browsers; blocks."""
         take = self.take_of(session_id)
         if take is not None:
             return take.standing()
         row = self.rows.current(session_id)
-        found = describe_unjoined(row)
+        state = describe_unjoined(row)
         if row is not None and row.is_open and not self.owner.has(row):
-            found["problem"] = NODE_AWAY
-        return found
+            state["problem"] = NODE_AWAY
+        return state
 
     def tell_state(self, take: ActiveTake) -> None:
-        """Tell the browsers where a take stands; of one that is over `_tell_over` has the last word."""
+        """Send the state of a trial to browsers, unless it has ended (see `_tell_over`)."""
         if self._takes.get(take.id) is take:
             take.room.say("state", msgspec.json.encode(take.standing()))
 
     def tell_row(self, row: live.LiveTakeRecord) -> None:
-        """Tell the browsers of a take that no tablet has joined yet."""
+        """Send the state of a trial without a tablet to browsers."""
         take = self._takes.get(row.id)
         if take is None:
             self.room(row.session_id).clear()
@@ -285,12 +285,12 @@ class Hub:
     # what the take tells
 
     def note_started(self, take: ActiveTake) -> None:
-        """The first batch has come."""
+        """Register the first batch."""
         self._spawn(asyncio.to_thread(self.rows.start, take.id, take.recorder.hello.source))
         self.tell_state(take)
 
     def note_ended(self, take: ActiveTake, end: TakeEnd) -> None:
-        """Note that the end is durable."""
+        """Register that the end is durable."""
         self._spawn(self._ending.complete(take, end, lambda: self._forget(take)))
 
     # the estimators
@@ -333,7 +333,7 @@ class Hub:
                 self.tell_state(take)
 
     def _note(self, take: ActiveTake, code: str, text: str) -> None:
-        """Keep with the take what the server has to say of it."""
+        """Store a notice of the server with the trial."""
         self.journal.add(take.id, "notice", take.t_s, live_events.own_notice(code, text))
 
     # threads and tasks
@@ -346,11 +346,11 @@ class Hub:
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
-        told = 0.0
+        sent_at = 0.0
         while True:
             await asyncio.sleep(TICK_S)
             now = time.monotonic()
-            tell = now - told >= STATE_S
+            tell = now - sent_at >= STATE_S
             for take in tuple(self._takes.values()):
                 take.look(now)
                 if take.tablet is None and now - take.grown_at > ABANDONED_S and not take.over.is_set():
@@ -358,10 +358,10 @@ class Hub:
                     take.recorder.finish()
                 if tell and take.state == "streaming":
                     self.tell_state(take)
-            told = now if tell else told
+            sent_at = now if tell else sent_at
 
     async def _mind_rows(self) -> None:
-        """Let go of takes that were erased or taken over elsewhere, and end those that were ended there."""
+        """Release trials that were erased or taken over elsewhere, and end those ended there."""
         while True:
             await asyncio.sleep(MIND_S)
             try:

@@ -1,7 +1,7 @@
-"""The rules of one take's stream as a state machine: no socket, no clock, no disk.
+"""State machine of a live trial's stream, independent of sockets, clocks and disks.
 
-seq below the next one → a duplicate, ignored · the next one → kept · above → closed, the tablet resumes.
-Acknowledged is only what `note_synced` has been told of.
+seq below the next one → a duplicate, ignored · the next one → stored · above → closed, the tablet resumes.
+Batches are acknowledged only after `note_synced`.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ MISMATCH = "finish_mismatch"
 
 @dataclass(frozen=True)
 class TakeEnd:
-    """How a take has ended; it takes no more batches.
+    """End of a trial, after which batches are rejected.
 
     Parameters
     ----------
     count : batches in the log. sha256 : over their payloads in order of seq.
-    problem : None, or finish_mismatch: the tablet counted or hashed otherwise; the take is kept all the same.
+    problem : None, or finish_mismatch: the tablet's count or hash differs; the trial is stored nevertheless.
     """
 
     count: int
@@ -49,13 +49,13 @@ class TakeEnd:
 
 @dataclass(frozen=True)
 class IntakeAnswer:
-    """What to do with one message.
+    """Response to one message.
 
     Parameters
     ----------
-    say : text message to send at once, None = nothing. close : then close so, with `reason`.
-    keep : record for the log. battery : to show, not to store.
-    ended : the end that the tablet asks for is on the disk already; tell it which recording.
+    say : text message to send immediately, None = nothing. close : then close with this code and `reason`.
+    keep : record for the log. battery : levels for display only.
+    ended : the end requested by the tablet is already durable; reply with its recording.
     """
 
     say: str | None = None
@@ -70,20 +70,20 @@ NOTHING = IntakeAnswer()
 
 
 def refuse(error: ProtocolError) -> IntakeAnswer:
-    """Say why and close."""
+    """Response that reports an error and closes the connection."""
     return IntakeAnswer(protocol.error(error.code, error.message), error.close, error.code)
 
 
 @dataclass
 class _Span:
-    """How long a stream has lasted, by its own clock."""
+    """Duration of a stream by its own clock."""
 
     began_us: int
     length_s: float = 0.0
 
 
 class Intake:
-    """What is known of one take: its hello, how far it is, and whether it has ended.
+    """State of one trial: hello, progress, and end.
 
     `hello` is None until it is replayed or greeted.
     """
@@ -100,30 +100,30 @@ class Intake:
 
     @property
     def ended(self) -> TakeEnd | None:
-        """The end, once it is durable."""
+        """The end, once durable."""
         return self._ended() if self._end_durable else None
 
     @property
     def elapsed_s(self) -> float | None:
-        """From the first to the last sample, on the clock of the stream that is longest; None without one."""
+        """Duration of the longest stream by its own clock; None without samples."""
         return max((span.length_s for span in self._spans.values()), default=None)
 
     @property
     def heard(self) -> frozenset[int]:
-        """Streams of which a batch has come."""
+        """Streams with at least one batch."""
         return frozenset(self._spans)
 
     @property
     def is_over(self) -> bool:
-        """Whether an end was said, durable or not."""
+        """Whether the trial has been ended, durably or not."""
         return self._said is not None
 
     def replay(self, record: LogRecord) -> None:
-        """Learn from a record of the log, all of which is durable.
+        """Update from a record of the log, all of which is durable.
 
         Raises
         ------
-        InputError `live_log_order` when it is no log of ours.
+        InputError `live_log_order` if it is not a log of ours.
         """
         if (self.hello is None) != (record.kind == "H") or self._said is not None:
             raise InputError("live_log_order", f"The log has a record '{record.kind}' out of its order.")
@@ -140,7 +140,7 @@ class Intake:
             self._end_durable = True
 
     def greet(self, hello: Hello) -> IntakeAnswer:
-        """Answer a hello; a tablet that comes back must describe the same sensors."""
+        """Respond to a hello; a reconnecting tablet must describe the same sensors."""
         if self.hello is None:
             self.hello = hello
         if hello != self.hello:
@@ -156,7 +156,7 @@ class Intake:
         return IntakeAnswer(protocol.welcome(self.durable))
 
     def offer(self, message: bytes | str) -> IntakeAnswer:
-        """Answer one message of a greeted tablet; what is to be kept is in the answer."""
+        """Respond to one message of a greeted tablet; records to be stored are in the response."""
         try:
             if isinstance(message, bytes):
                 protocol.check_size(message)
@@ -176,13 +176,13 @@ class Intake:
             return refuse(ProtocolError(error.code, error.message))
 
     def end(self) -> IntakeAnswer:
-        """End the take from this side, with what has come so far."""
+        """End the trial on the server side with the received batches."""
         if self._said is not None:
             return IntakeAnswer(ended=self.ended)
         return self._keep_end(Finish(self.next_seq, self._hash.hexdigest()))
 
     def note_synced(self, records: int) -> None:
-        """The first `records` records kept since the take was opened are durable."""
+        """Mark the first `records` records since opening as durable."""
         self.durable = min(self._base + records, self.next_seq)
         self._end_durable = self._end_durable or self._base + records > self.next_seq
 

@@ -1,6 +1,6 @@
-"""Writes what the estimator tells (cues, calibrations, notices) into the database, a group a second.
+"""Writes the estimator's events (cues, calibrations, notices) to the database, grouped once a second.
 
-One thread for all takes: every transaction waits for the disk, and nothing that streams may wait for it.
+One thread for all trials: transactions wait for the disk, which must not delay streams.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ INTERVAL_S: Final = 0.5
 
 
 class Journal:
-    """The thread and the rows on their way to the table `live_event`."""
+    """Thread and queue of rows for the table `live_event`."""
 
     def __init__(self, db: Database, interval_s: float = INTERVAL_S) -> None:
         self._db = db
@@ -44,7 +44,7 @@ class Journal:
         self._thread.start()
 
     def stop(self) -> None:
-        """Write what is there and end."""
+        """Write queued rows and end."""
         self._stop.set()
         self._work.set()
         if self._thread.is_alive():
@@ -52,26 +52,26 @@ class Journal:
         self.write()
 
     def add(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
-        """Have a row written; returns at once."""
+        """Queue a row; returns immediately."""
         row = {"take_id": take_id, "kind": kind, "t_s": t_s, "content": dict(content), "at": now()}
         with self._guard:
             self._rows.append(row)
         self._work.set()
 
     def write(self) -> None:
-        """Write all rows in one transaction; those of takes that were erased meanwhile go."""
+        """Write all rows in one transaction, except those of erased trials."""
         with self._guard:
             rows, self._rows = self._rows, []
         if not rows:
             return
         try:
             with self._db.write() as c:
-                wanted = {row["take_id"] for row in rows}
-                there = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(wanted))).scalars())
-                kept = [row for row in rows if row["take_id"] in there]
-                if kept:
-                    c.execute(insert(live_event), kept)
-                    note_feedback(c, {row["take_id"] for row in kept if _told(row)})
+                ids = {row["take_id"] for row in rows}
+                existing = set(c.execute(select(live_take.c.id).where(live_take.c.id.in_(ids))).scalars())
+                valid = [row for row in rows if row["take_id"] in existing]
+                if valid:
+                    c.execute(insert(live_event), valid)
+                    note_feedback(c, {row["take_id"] for row in valid if _told(row)})
         except SQLAlchemyError as error:
             self._disk.note_refusal(error, "live events")
             with self._guard:

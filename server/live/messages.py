@@ -1,6 +1,6 @@
-"""What web process and estimator process say to each other: MessagePack over a socket pair, not pickle.
+"""Messages between web and estimator processes: MessagePack over a socket pair, not pickle.
 
-The samples are not among it: the estimator reads them from the take's log, whose new length it is told.
+Samples are not transmitted: the estimator reads them from the log, of which it receives the current size.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any, Final, Literal
 
 import msgspec
 
-from sagittal.web.user_text import encode_user_text
+from sagittal.core.user_text import encode_user_text
 
 STALE_S: Final = 0.5
 """Data older than this are not fed back (docs/science/feedback.md, "Which strides get a cue")."""
@@ -22,7 +22,7 @@ Kind = Literal["stride", "cue", "calibration", "guard", "notice"]
 
 
 class Command(msgspec.Struct, frozen=True, tag=True):
-    """Web to estimator: a therapist's command, valid from the batch `before` on, in a replay too."""
+    """Web to estimator: a therapist's command, effective from the batch `before`, also in a replay."""
 
     take: str
     before: int
@@ -31,11 +31,11 @@ class Command(msgspec.Struct, frozen=True, tag=True):
 
 
 class FollowTake(msgspec.Struct, frozen=True, tag=True):
-    """Web to estimator: follow this take from the start of its log.
+    """Web to estimator: process this trial from the start of its log.
 
     Parameters
     ----------
-    size : bytes of the log that were there before; what comes out of them is late.
+    size : existing bytes of the log; results from them are marked late.
     prescription, baseline : JSON of sagittal.core.feedback, None = no feedback. commands : given so far.
     """
 
@@ -50,31 +50,31 @@ class FollowTake(msgspec.Struct, frozen=True, tag=True):
 
 
 class LogGrown(msgspec.Struct, frozen=True, tag=True):
-    """Web to estimator: logs have so many bytes now; `at` = monotonic time of the newest."""
+    """Web to estimator: current sizes of logs; `at` = monotonic time of the latest data."""
 
     sizes: dict[str, int]
     at: float
 
 
 class Charge(msgspec.Struct, frozen=True, tag=True):
-    """Web to estimator: battery of sensors in percent, to be shown."""
+    """Web to estimator: battery levels of sensors in percent, for display."""
 
     take: str
     percent: dict[str, float]
 
 
 class ForgetTake(msgspec.Struct, frozen=True, tag=True):
-    """Web to estimator: forget this take."""
+    """Web to estimator: stop processing this trial."""
 
     take: str
 
 
 class EstimatorReady(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: everything is imported and compiled."""
+    """Estimator to web: all modules are imported and compiled."""
 
 
 class FigurePose(msgspec.Struct, frozen=True, tag=True):
-    """The figure at one moment: float32 q (n, 4) and p (n, 3) of the named segments, as `LiveFrame`."""
+    """Pose of the avatar at one time: float32 q (n, 4) and p (n, 3) of the named segments, as `LiveFrame`."""
 
     segments: list[str]
     q: bytes
@@ -84,13 +84,13 @@ class FigurePose(msgspec.Struct, frozen=True, tag=True):
 
 
 class Picture(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: the newest state of a take; an older one that was not sent yet is worth nothing.
+    """Estimator to web: latest state of a trial; supersedes an older one not yet sent.
 
     Parameters
     ----------
     t_s, seq, stage : as `LiveFrame`. body : JSON object for the browsers, without its closing brace.
-    delay_s : from when its last sample was due to when this was said. size : bytes of the log it has seen.
-    say : what the person of a guided test does now.
+    delay_s : from the due time of its last sample to transmission. size : bytes of the log processed.
+    say : current instruction of a guided test.
     """
 
     take: str
@@ -105,11 +105,11 @@ class Picture(msgspec.Struct, frozen=True, tag=True):
 
 
 class FeedItem(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: something that happens once, the `k`th of its kind; a replay says it again.
+    """Estimator to web: a one-time event, the `k`th of its kind; repeated in a replay.
 
     Parameters
     ----------
-    body : JSON object for the browsers. late : it came out of samples that are no longer fresh.
+    body : JSON object for the browsers. late : computed from delayed samples.
     """
 
     take: str
@@ -121,20 +121,20 @@ class FeedItem(msgspec.Struct, frozen=True, tag=True):
 
 
 class FeedbackStatus(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: where the feedback stands, JSON for the browsers."""
+    """Estimator to web: state of the feedback, JSON for browsers."""
 
     take: str
     body: bytes
 
 
 class LogProcessed(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: the log has its end, and everything before it has been told."""
+    """Estimator to web: the log is complete and all its results have been sent."""
 
     take: str
 
 
 class EstimateFailed(msgspec.Struct, frozen=True, tag=True):
-    """Estimator to web: this take cannot be estimated any further; it is recorded all the same."""
+    """Estimator to web: estimation of this trial failed; it is still recorded."""
 
     take: str
     code: str

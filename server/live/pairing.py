@@ -1,4 +1,4 @@
-"""The short code of a take → a token for its stream, as the tablet's page does it."""
+"""Exchange of a trial's short pairing code for a stream token, like the tablet page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from sagittal.server.live.sender import LiveError
 
 @dataclass(frozen=True)
 class PairingResult:
-    """What a code opens: `socket` is a whole ws:// or wss:// address."""
+    """Result of pairing: `socket` is a complete ws:// or wss:// URL."""
 
     token: str
     take: str
@@ -25,7 +25,7 @@ class PairingResult:
 
 
 def pair(address: str, code: str) -> PairingResult:
-    """Pair with the server at an http:// or https:// address.
+    """Pair with the server at an http:// or https:// URL.
 
     Raises
     ------
@@ -45,22 +45,23 @@ def pair(address: str, code: str) -> PairingResult:
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(request, timeout=20) as answer:
-            said: Any = read_json(answer.read())
+            reply: Any = read_json(answer.read())
     except urllib.error.HTTPError as refused:
         raise _refusal(refused) from None
     except (OSError, ValueError) as error:
         cause = getattr(error, "reason", error)
-        why = getattr(cause, "strerror", None) or cause
+        reason = getattr(cause, "strerror", None) or cause
         raise LiveError(
-            "unreachable", f"{base} cannot be reached ({why}); is the server running, and the address right?"
+            "unreachable",
+            f"{base} cannot be reached ({reason}); is the server running, and the address right?",
         ) from None
     scheme = "wss" if parts.scheme == "https" else "ws"
     return PairingResult(
-        token=said["token"],
-        take=said["take"],
-        session_title=said.get("session_title") or "",
-        patient_code=said.get("patient_code") or "",
-        socket=urlunsplit((scheme, parts.netloc, said["socket"], "", "")),
+        token=reply["token"],
+        take=reply["take"],
+        session_title=reply.get("session_title") or "",
+        patient_code=reply.get("patient_code") or "",
+        socket=urlunsplit((scheme, parts.netloc, reply["socket"], "", "")),
     )
 
 

@@ -1,8 +1,8 @@
-"""A recording cut into the batches a tablet would have sent, each with the moment it is due.
+"""Division of a recording into batches as sent by a tablet, with their due times.
 
-Sensors whose samples lie on one grid become one stream; what a sensor has not measured is NaN. A sensor with
-times of its own becomes a stream with offsets. The sender's clock is the recording's: playing it again sends
-the same bytes, whatever the speed.
+Sensors whose samples share a time grid form one stream; missing samples are NaN. A sensor with its own sample
+times forms a stream with offsets. The sender's clock is the recording's: each playback sends the same bytes
+at any speed.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ ON_GRID: Final = 0.01
 
 @dataclass(frozen=True)
 class DueBatch:
-    """A batch and when its last sample is there, in seconds from the first sample of the recording."""
+    """A batch and the due time of its last sample, in seconds from the first sample of the recording."""
 
     at_s: float
     frame: bytes
@@ -42,21 +42,25 @@ class DueBatch:
 
 @dataclass
 class _Grid:
-    """Sensors on one grid: sample `tick` of it is at start_s + tick / rate_hz."""
+    """Sensors on one grid: sample `tick` is at start_s + tick / rate_hz."""
 
     rate_hz: float
     start_s: float
     sensors: list[tuple[str, ImuStream]]
 
     def ticks(self, stream: ImuStream) -> Floats | None:
-        """Ticks of a sensor's samples, None when they are not on this grid."""
-        at: Floats = (stream.t_s - self.start_s) * self.rate_hz
-        whole: Floats = np.rint(at)
-        return whole if np.abs(at - whole).max() <= ON_GRID and len(np.unique(whole)) == len(at) else None
+        """Ticks of a sensor's samples, None if they are not on this grid."""
+        positions: Floats = (stream.t_s - self.start_s) * self.rate_hz
+        whole: Floats = np.rint(positions)
+        return (
+            whole
+            if np.abs(positions - whole).max() <= ON_GRID and len(np.unique(whole)) == len(positions)
+            else None
+        )
 
 
 def hello_of(recording: Recording, take: str) -> Hello:
-    """What a replay of this recording says first; the mapped sensors, or all when none is mapped."""
+    """Hello message for a replay of this recording; mapped sensors, or all if none is mapped."""
     return Hello(
         take,
         "cli",
@@ -73,11 +77,11 @@ def hello_of(recording: Recording, take: str) -> Hello:
 
 
 def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
-    """All batches in the order in which they are due.
+    """All batches in order of their due times.
 
     Parameters
     ----------
-    per_batch : samples of a batch, 1 to 1000.
+    per_batch : samples per batch, 1 to 1000.
 
     Raises
     ------
@@ -91,15 +95,15 @@ def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
         (piece for number, grid in enumerate(grids) for piece in _pieces(number, grid, per_batch, begin_s)),
         key=lambda piece: (piece[0], piece[1].stream),
     )
-    found = []
+    batches = []
     for seq, (at_us, b) in enumerate(pieces):
         batch = SampleBatch(b.stream, seq, b.t0_us, at_us, b.samples, b.offsets_us)
-        found.append(DueBatch(at_us * 1e-6, encode_batch(batch)))
-    return found
+        batches.append(DueBatch(at_us * 1e-6, encode_batch(batch)))
+    return batches
 
 
 async def pace_batches(batches: Sequence[DueBatch], speed: float) -> AsyncIterator[bytes]:
-    """The batches when they are due; `speed` 2 = twice as fast, 0 = at once."""
+    """Yield batches when due; `speed` 2 = twice as fast, 0 = immediately."""
     loop = asyncio.get_running_loop()
     began = loop.time()
     for one in batches:
@@ -125,7 +129,7 @@ def _grids(recording: Recording) -> list[_Grid]:
 
 
 def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterator[tuple[int, SampleBatch]]:
-    """When a batch is due in µs, and the batch without its place in the sequence."""
+    """Due time in µs and the batch without its sequence number."""
     first = grid.sensors[0][1]
     if grid.ticks(first) is None:
         t_us = np.rint((first.t_s - begin_s) * 1e6).astype(np.int64)
@@ -140,22 +144,22 @@ def _pieces(number: int, grid: _Grid, per_batch: int, begin_s: float) -> Iterato
     samples = np.full((max(int(t[-1]) for t in ticks) - lowest + 1, len(ticks), CHANNELS), np.nan, np.float32)
     for k, ((_, stream), t) in enumerate(zip(grid.sensors, ticks, strict=True)):
         samples[t - lowest, k] = _channels(stream)
-    there = np.zeros(len(samples), bool)
-    there[np.concatenate(ticks) - lowest] = True
-    for i, j in _runs(there, per_batch):
+    present = np.zeros(len(samples), bool)
+    present[np.concatenate(ticks) - lowest] = True
+    for i, j in _runs(present, per_batch):
         t0, last = (round((grid.start_s - begin_s + (lowest + x) / grid.rate_hz) * 1e6) for x in (i, j - 1))
         yield last, SampleBatch(number, 0, t0, 0, samples[i:j])
 
 
-def _runs(there: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
-    """Stretches of at most so many samples without a tick at which no sensor measured."""
-    for start, stop in find_runs(there):
+def _runs(present: np.ndarray[tuple[int], np.dtype[np.bool_]], most: int) -> Iterator[tuple[int, int]]:
+    """Runs of limited length without ticks at which no sensor measured."""
+    for start, stop in find_runs(present):
         for i in range(start, stop, most):
             yield i, min(i + most, stop)
 
 
 def _channels(stream: ImuStream) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    """(n, 9) acc, gyr, mag; NaN where there is none."""
+    """(n, 9) acc, gyr, mag; NaN if missing."""
     nothing = np.full_like(stream.acc, np.nan)
     parts = [x if x is not None else nothing for x in (stream.acc, stream.gyr, stream.mag)]
     return np.concatenate(parts, axis=1).astype(np.float32)

@@ -1,6 +1,7 @@
-"""The estimator processes: started with the server to be warm before the first take; replaced when they die.
+"""Pool of estimator processes, started with the server to be warm before the first trial; restarted on
+failure.
 
-Used on the event loop. What goes to a process never piles up: of a log's lengths only the newest counts.
+Runs on the event loop. Messages do not accumulate: of a log's sizes only the latest is sent.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ MODULE: Final = "sagittal.server.live.estimator"
 
 
 class EstimatorPool:
-    """Estimator processes and which take each of them follows.
+    """Estimator processes and their trials.
 
     Parameters
     ----------
-    report : called with everything a process says. begin : makes the order to follow a take from its start,
-        None when it is over. restarted : called with the takes of a process that has died.
+    report : called with each message of a process. begin : creates the order to process a trial from its
+        start, None if it has ended. restarted : called with the trials of a crashed process.
     """
 
     def __init__(
@@ -57,16 +58,16 @@ class EstimatorPool:
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of those that live."""
+        """Process ids of the running processes."""
         return [pid for w in self._workers if (pid := w.process.pid) is not None]
 
     @property
     def is_ready(self) -> bool:
-        """Whether every process has said that it is warm."""
+        """Whether all processes are warm."""
         return bool(self._workers) and all(w.process.is_warm for w in self._workers)
 
     def start(self) -> None:
-        """Start the processes, once; they get warm by themselves."""
+        """Start the processes without waiting until they are warm; idempotent."""
         if self._workers or not self._settings.live_workers:
             return
         self._workers = [_Estimator(self) for _ in range(self._settings.live_workers)]
@@ -83,7 +84,7 @@ class EstimatorPool:
         self._workers = []
 
     def follow(self, take: str) -> None:
-        """Give a take to the process with the fewest, or have its process read it again from the start."""
+        """Assign a trial to the least busy process, or restart it from the beginning in its process."""
         if not self._workers:
             return
         worker = self._of(take) or min(self._workers, key=lambda w: len(w.takes))
@@ -93,26 +94,26 @@ class EstimatorPool:
             worker.send(order)
 
     def grow(self, take: str, size: int) -> None:
-        """A take's log has `size` bytes."""
+        """Register a log size of `size` bytes."""
         worker = self._of(take)
         if worker is not None:
             worker.grow(take, size)
 
     def send(self, order: Command | Charge) -> None:
-        """Hand on a command or the battery."""
+        """Forward a command or battery levels."""
         worker = self._of(order.take)
         if worker is not None:
             worker.send(order)
 
     def leave(self, take: str) -> None:
-        """Follow a take no longer."""
+        """Stop processing a trial."""
         worker = self._of(take)
         if worker is not None:
             worker.takes.discard(take)
             worker.send(ForgetTake(take))
 
     def follows(self, take: str) -> bool:
-        """Whether a process follows this take."""
+        """Whether a process is assigned to this trial."""
         return self._of(take) is not None
 
     def _of(self, take: str) -> _Estimator | None:
@@ -127,27 +128,27 @@ class EstimatorPool:
     # what a worker tells
 
     def handle_message(self, report: Report) -> None:
-        """Called by a worker with every report."""
+        """Callback of a worker for each report."""
         self._report(report)
 
     def list_orders(self, takes: set[str]) -> list[Order]:
-        """Called by a worker that starts: what it is to follow."""
+        """Callback of a starting worker: orders for its trials."""
         orders = {take: self._begin(take) for take in takes}
         takes.difference_update(take for take, order in orders.items() if order is None)
         return [order for order in orders.values() if order is not None]
 
     def note_death(self, takes: set[str]) -> None:
-        """Called by a worker whose process has ended unasked."""
+        """Callback of a worker whose process ended unexpectedly."""
         self._restarted(sorted(takes))
 
     @property
     def settings(self) -> Settings:
-        """Of the installation."""
+        """Settings of the installation."""
         return self._settings
 
 
 class _Estimator:
-    """One process and the takes it follows; the process may be another each time."""
+    """One worker and its trials; its process may be replaced."""
 
     def __init__(self, pool: EstimatorPool) -> None:
         self._pool = pool
@@ -173,7 +174,7 @@ class _Estimator:
             asyncio.get_running_loop().call_soon(self._flush)
 
     def look(self) -> None:
-        """End a process that hangs; flush what waited for it to read."""
+        """End a hung process; flush pending messages."""
         if self._sizes:
             self._flush()
         self.process.end_if_hung()

@@ -1,7 +1,6 @@
-"""What tablet and server say to each other on a live socket, beside the batches
-(docs/reference/live-protocol.md).
+"""Messages between tablet and server on a live socket, other than batches (docs/reference/live-protocol.md).
 
-Parsing answers every malformed message with a code; nothing here knows of sockets, clocks or disks.
+Malformed messages are reported with a code. Independent of sockets, clocks and disks.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ MOST_MESSAGE_BYTES: Final = MOST_FRAME_BYTES
 
 
 class CloseCode(IntEnum):
-    """Why a live socket is closed; below 4000 the codes of RFC 6455, 4000 + an HTTP status where one fits."""
+    """Close codes of a live socket: RFC 6455 below 4000, otherwise 4000 + a suitable HTTP status."""
 
     DONE = 1000
     GOING_AWAY = 1001
@@ -56,7 +55,7 @@ FINAL: Final = frozenset(
 
 
 class ProtocolError(InputError):
-    """A message that is not taken: `code` and `message` say why, `close` is how the socket is closed."""
+    """A rejected message: `code` and `message` give the reason, `close` is the close code."""
 
     def __init__(self, code: str, message: str, close: CloseCode = CloseCode.MALFORMED) -> None:
         super().__init__(code, message)
@@ -68,7 +67,7 @@ class ProtocolError(InputError):
 
 @dataclass(frozen=True)
 class Battery:
-    """Charge by sensor id, 0 to 100 %."""
+    """Battery level by sensor id, 0 to 100 %."""
 
     percent: Mapping[str, float]
 
@@ -78,7 +77,7 @@ Said = Hello | SampleBatch | Finish | Battery
 
 
 def parse(text: str) -> Said:
-    """Read a text message.
+    """Parse a text message.
 
     Raises
     ------
@@ -104,14 +103,14 @@ def parse(text: str) -> Said:
                 return _battery(root)
     except InputError as error:
         raise ProtocolError(error.code, error.message) from None
-    shown = repr(kind)[:40]
+    kind_text = repr(kind)[:40]
     raise ProtocolError(
-        "message_unknown", f"The message's type is {shown}; expected hello, batch, finish or battery."
+        "message_unknown", f"The message's type is {kind_text}; expected hello, batch, finish or battery."
     )
 
 
 def check_size(message: bytes | str) -> None:
-    """Refuse a message above 1 MiB.
+    """Reject a message above 1 MiB.
 
     Raises
     ------
@@ -137,42 +136,42 @@ def _battery(root: Mapping[str, Any]) -> Battery:
 
 
 def welcome(next_seq: int) -> str:
-    """Answer to hello: all batches below are on the disk, go on with this one."""
+    """Reply to hello: all batches below are durable, continue with this one."""
     return _text("welcome", next_seq=next_seq, max_unacked=MAX_UNACKED)
 
 
-def ack(below: int) -> str:
-    """All batches below this one are on the disk."""
-    return _text("ack", ack=below)
+def ack(seq: int) -> str:
+    """Acknowledge: all batches below this one are durable."""
+    return _text("ack", ack=seq)
 
 
 def error(code: str, detail: str, **more: object) -> str:
-    """Message that something was refused."""
+    """Message that reports an error."""
     return _text("error", code=code, detail=detail, **more)
 
 
 def command(name: Literal["start", "stop"]) -> str:
-    """What the therapist asks of the tablet."""
+    """Command from the therapist to the tablet."""
     return _text("command", command=name)
 
 
 def state(stage: str, say: str | None = None) -> str:
-    """Where the estimation stands (waiting, stand, walk, running), for the tablet's instructions.
+    """Stage of the estimation (waiting, stand, walk, running), for the tablet's instructions.
 
     Parameters
     ----------
-    say : what the person of a guided test does now; it goes before the stage.
+    say : current instruction of a guided test; takes precedence over the stage.
     """
     return _text("state", stage=stage) if say is None else _text("state", stage=stage, say=say)
 
 
 def judge_calibration(verdict: Mapping[str, Any]) -> str:
-    """Whether the calibration passes, why not, and what to do (`wire.judge_calibration`)."""
+    """Outcome of the calibration, with reasons and remedies (`wire.judge_calibration`)."""
     return _text("calibration", **verdict)
 
 
 def announce_finish(recording: str, problem: str | None = None) -> str:
-    """The take is a recording now; `problem` (finish_mismatch): it was kept although the end did not fit."""
+    """The trial is stored as a recording; `problem` (finish_mismatch): despite a mismatch at its end."""
     return _text("finished", recording=recording, **({"problem": problem} if problem else {}))
 
 

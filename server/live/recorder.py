@@ -1,13 +1,13 @@
-"""One take on its way to the disk: what the socket's route needs, and nothing that could make it wait.
+"""Non-blocking recorder of one live trial, used by the socket's route.
 
-Used on the event loop. `offer` checks a message, queues it for the committer's thread and returns; the
-listener is called back on the loop when it can be read, when it is durable, and when the disk refuses.
+Runs on the event loop. `offer` validates a message, queues it for the committer's thread and returns; the
+listener is called on the loop when it is readable, when it is durable, and on disk errors.
 
     committer = Committer(); committer.start()             # one per server
     recorder = await open_recorder(path, hello, committer, listener)
-    answer = recorder.greet(hello)                         # of every connection: welcome, or hello_changed
-    answer = recorder.offer(message)                       # of every message, str or bytes
-    await recorder.close()                                 # at shut-down, or when the take is over
+    answer = recorder.greet(hello)                         # per connection: welcome, or hello_changed
+    answer = recorder.offer(message)                       # per message, str or bytes
+    await recorder.close()                                 # at shutdown, or when the trial has ended
 """
 
 from __future__ import annotations
@@ -25,38 +25,38 @@ from sagittal.server.storage.refusal import FULL
 
 
 class RecorderListener(Protocol):
-    """Who is told what happens to a take; all calls come on the event loop and must not block it."""
+    """Callbacks for recording events, called on the event loop; must not block."""
 
     def note_growth(self, size: int) -> None:
-        """The log has `size` bytes of whole records now; readers of the file may go so far.
+        """The log now has `size` readable bytes of complete records.
 
-        After a failure of the disk it can be less than before: what had not been synced was cut off, and
-        whoever has read beyond `size` starts anew.
+        After a disk error the size may decrease, because unsynced data were dropped; readers beyond `size`
+        must restart.
         """
 
-    def note_acknowledged(self, below: int) -> None:
-        """All batches below this one survive a power cut: tell the tablet (`protocol.ack`)."""
+    def note_acknowledged(self, seq: int) -> None:
+        """All batches below this one are durable and can be acknowledged to the tablet (`protocol.ack`)."""
 
     def note_end(self, end: TakeEnd) -> None:
-        """The end is durable and the log file complete."""
+        """The end is durable and the log complete."""
 
     def note_failure(self, error: ProtocolError) -> None:
-        """The disk refuses (storage_full, storage_failed): say so and close with `error.close`.
+        """Disk error (storage_full, storage_failed): report it and close with `error.close`.
 
-        The tablet keeps what is not acknowledged and comes back; `reopen` before greeting it.
+        The tablet retains unacknowledged batches and reconnects; call `reopen` before greeting it.
         """
 
 
 class Recorder:
-    """One take's log with its rules.
+    """Log of one live trial with its protocol state.
 
-    Made by `open_recorder` or `restore`.
+    Created by `open_recorder` or `restore`.
 
     Parameters
     ----------
-    intake : what the log holds. log : open for appending. post : the way to the event loop.
+    intake : state restored from the log. log : open for appending. post : posts calls to the event loop.
 
-    `damage` : what could not be read of the log when it was opened, None = all is well.
+    `damage` : unreadable part of the log found on opening, None = intact.
     """
 
     def __init__(
@@ -81,61 +81,61 @@ class Recorder:
 
     @property
     def next_seq(self) -> int:
-        """The batch that comes next: so many have been taken."""
+        """Sequence number of the next batch."""
         return self._intake.next_seq
 
     @property
     def durable(self) -> int:
-        """So many batches survive a power cut."""
+        """Number of durable batches."""
         return self._intake.durable
 
     @property
     def elapsed_s(self) -> float | None:
-        """Seconds from the first to the last sample that has come; None before the first."""
+        """Seconds from the first to the last received sample; None before the first."""
         return self._intake.elapsed_s
 
     @property
     def heard(self) -> frozenset[int]:
-        """Streams of which a batch has come."""
+        """Streams with at least one batch."""
         return self._intake.heard
 
     @property
     def size(self) -> int:
-        """Bytes of the log that can be read."""
+        """Readable bytes of the log."""
         return self._size
 
     @property
     def end(self) -> TakeEnd | None:
-        """How the take ended, once that is durable."""
+        """The end of the trial, once durable."""
         return self._intake.ended
 
     @property
     def failure(self) -> ProtocolError | None:
-        """Why nothing is taken until `reopen`, None = all is well."""
+        """Error that blocks recording until `reopen`, None if none."""
         return self._failure
 
     def greet(self, hello: Hello) -> IntakeAnswer:
-        """Answer the hello of a connection, the first or a later one."""
+        """Respond to the hello of a connection, the first or a later one."""
         return refuse(self._failure) if self._failure else self._intake.greet(hello)
 
     def offer(self, message: bytes | str) -> IntakeAnswer:
-        """Answer one message; never waits, never raises for what a tablet can send."""
+        """Respond to one message; never blocks or raises, whatever the tablet sends."""
         if self._failure:
             return refuse(self._failure)
         return self._kept(self._intake.offer(message))
 
     def finish(self) -> IntakeAnswer:
-        """End the take here; `RecorderListener.note_end` follows, or the answer says it is there already."""
+        """End the trial on the server; `RecorderListener.note_end` follows if the response lacks the end."""
         if self._failure:
             return refuse(self._failure)
         return self._kept(self._intake.end())
 
     async def reopen(self) -> None:
-        """Go back to what is durable after a failure of the disk.
+        """Return to the durable state after a disk error.
 
         Raises
         ------
-        ProtocolError storage_full, storage_failed: the disk still refuses.
+        ProtocolError storage_full, storage_failed: the disk still fails.
         """
         try:
             self._intake = await asyncio.to_thread(self._restart)
@@ -146,25 +146,25 @@ class Recorder:
         self.note_written(self._lane.log.size)
 
     async def close(self) -> None:
-        """Write and sync what has been taken and let go of the file."""
+        """Write and sync queued records and close the file."""
         await asyncio.to_thread(self._lane.close)
 
     def note_written(self, size: int) -> None:
-        """Note that the log has so many bytes; the committer's lane says it."""
+        """Callback of the committer's lane: readable bytes of the log."""
         self._size = size
         self._listener.note_growth(size)
 
     def note_synced(self, records: int) -> None:
-        """Note that so many records are on the disk; the committer's lane says it."""
-        before, was_over = self._intake.durable, self._intake.ended
+        """Callback of the committer's lane: number of synced records."""
+        durable_before, was_over = self._intake.durable, self._intake.ended
         self._intake.note_synced(records)
-        if self._intake.durable > before:
+        if self._intake.durable > durable_before:
             self._listener.note_acknowledged(self._intake.durable)
         if self._intake.ended and not was_over:
             self._listener.note_end(self._intake.ended)
 
     def note_failure(self, error: OSError) -> None:
-        """Note that the log cannot be written; the committer's lane says it."""
+        """Callback of the committer's lane: the log cannot be written."""
         self._failure = _refused(error)
         self._listener.note_failure(self._failure)
 
@@ -186,14 +186,14 @@ class Recorder:
 async def open_recorder(
     path: Path, hello: Hello | None, committer: Committer, listener: RecorderListener
 ) -> Recorder:
-    """Open the take at `path`, or begin it with this hello.
+    """Open the trial at `path`, or create it with this hello.
 
     Raises
     ------
     ProtocolError
-        storage_full, storage_failed; take_empty: there is no log and no hello to begin one with.
+        storage_full, storage_failed; take_empty: neither a log nor a hello exists.
     InputError
-        live_log_order, live_log_damaged: the file is no log of ours; it is left as it is.
+        live_log_order, live_log_damaged: the file is not a valid log; it is not modified.
     """
     post = committer.post_to(asyncio.get_running_loop())
     try:
@@ -204,7 +204,7 @@ async def open_recorder(
 
 
 def restore(path: Path, hello: Hello | None) -> tuple[Intake, segments.TakeLog]:
-    """What a log holds, and the log open for appending; blocks.
+    """Read a log and open it for appending; blocks.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""Who watches a session: browsers that each get the newest state and, in order, what happens once.
+"""Viewers of a session: each browser receives the latest state, and one-time events in order.
 
-A browser that is too slow loses frames, never the others' time: state is replaced while it waits, and of what
-happens once the oldest goes beyond `QUEUE`.
+A slow browser loses frames without delaying the others: pending state is replaced, and beyond `QUEUE` the
+oldest events are dropped.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STATES: Final = ("state", "feedback", "frame")
 
 
 class StrideNumber(msgspec.Struct, frozen=True):
-    """What names a stride in what is told of it."""
+    """Number that identifies a stride in messages about it."""
 
     n: int
 
@@ -35,7 +35,7 @@ _number = msgspec.json.Decoder(StrideNumber).decode
 
 
 class BrowserQueue:
-    """One browser's letter box."""
+    """Outgoing messages of one browser."""
 
     def __init__(self) -> None:
         self._newest: dict[str, bytes] = {}
@@ -43,7 +43,7 @@ class BrowserQueue:
         self._wake = asyncio.Event()
 
     def put(self, kind: str, body: bytes) -> None:
-        """Leave a message."""
+        """Add a message."""
         if kind in STATES:
             self._newest[kind] = body
         else:
@@ -51,18 +51,18 @@ class BrowserQueue:
         self._wake.set()
 
     async def take(self) -> list[bytes]:
-        """Wait for messages and return all of them: what happened before where things stand now."""
+        """Wait for messages and return all of them: events before current states."""
         await self._wake.wait()
         self._wake.clear()
         state = self._newest.pop("state", None)
-        rest = [self._newest.pop(kind) for kind in STATES if kind in self._newest]
-        messages = [*([state] if state else []), *self._once, *rest]
+        states = [self._newest.pop(kind) for kind in STATES if kind in self._newest]
+        messages = [*([state] if state else []), *self._once, *states]
         self._once.clear()
         return messages
 
 
 class Room:
-    """The browsers of one session and what one that comes later gets first."""
+    """Browsers of one session, and the messages that a new one receives first."""
 
     def __init__(self) -> None:
         self.viewers: set[BrowserQueue] = set()
@@ -74,50 +74,50 @@ class Room:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nobody watches."""
+        """Whether there are no viewers."""
         return not self.viewers and not self._watchers
 
     def clear(self) -> None:
-        """Another take begins with nothing of the one before."""
+        """Reset everything for a new trial."""
         self.picture = None
         self._newest.clear()
         self._strides.clear()
         self._cues.clear()
 
     def say(self, kind: str, body: bytes) -> None:
-        """Tell everybody."""
+        """Send a message to all browsers."""
         if kind in STATES:
             self._newest[kind] = body
         for viewer in self.viewers:
             viewer.put(kind, body)
 
     def keep_stride(self, body: bytes) -> None:
-        """Keep what was told last of a stride for those who come later."""
+        """Store the latest message about a stride for browsers that join later."""
         _keep(self._strides, _number(body).n, body)
 
     def forget_strides(self) -> None:
-        """Calibrated anew: what was told belongs to the old axes, and strides are counted from 0 again."""
+        """Discard strides after a new calibration: they used the old axes, and numbering restarts at 0."""
         self._strides.clear()
         self._cues.clear()
 
     def keep_cue(self, k: int, body: bytes) -> None:
-        """Keep the `k`th cue for those who come later."""
+        """Store the `k`th cue for browsers that join later."""
         _keep(self._cues, k, body)
 
     @property
     def strides(self) -> tuple[bytes, ...]:
-        """What was told last of each of the last strides, in order."""
+        """Latest message about each recent stride, in order."""
         return tuple(self._strides[k] for k in sorted(self._strides))
 
     def show(self, picture: Picture) -> None:
-        """Hand on the figure."""
+        """Forward a picture of the avatar."""
         self.picture = picture
         for watcher in tuple(self._watchers):
             watcher(picture)
 
     @contextmanager
     def viewing(self) -> Iterator[BrowserQueue]:
-        """A browser, while it is there."""
+        """Context in which a browser is connected."""
         viewer = BrowserQueue()
         if "state" in self._newest:
             viewer.put("state", self._newest["state"])
@@ -136,7 +136,7 @@ class Room:
 
     @contextmanager
     def watching(self, watcher: Callable[[Picture], None]) -> Iterator[None]:
-        """Call `watcher` on the event loop with every new picture, first with the last one."""
+        """Call `watcher` on the event loop with every new picture, starting with the last one."""
         self._watchers.append(watcher)
         if self.picture is not None:
             watcher(self.picture)
@@ -146,7 +146,7 @@ class Room:
             self._watchers.remove(watcher)
 
 
-def _keep(kept: dict[int, bytes], k: int, body: bytes) -> None:
-    kept[k] = body
-    while len(kept) > KEPT:
-        del kept[min(kept)]
+def _keep(messages: dict[int, bytes], k: int, body: bytes) -> None:
+    messages[k] = body
+    while len(messages) > KEPT:
+        del messages[min(messages)]

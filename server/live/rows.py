@@ -1,4 +1,4 @@
-"""What the hub reads and writes in the database; everything here blocks and is called in a thread."""
+"""Database access of the hub; all functions block and are called in threads."""
 
 from __future__ import annotations
 
@@ -18,45 +18,45 @@ from sagittal.server.storage.schema.live_tables import live_take
 
 
 class Rows:
-    """The rows of live takes."""
+    """Database rows of live trials."""
 
     def __init__(self, db: Database, reviewed: ReviewedAnalyses) -> None:
         self._db, self._reviewed = db, reviewed
 
     def claim(self, row: live.LiveTakeRecord, owner: live.TakeOwner) -> live.LiveTakeRecord:
-        """Have a take from now on; raises NodeAway, NotFound."""
+        """Take ownership of a trial; raises NodeAway, NotFound."""
         if owner.node is None and row.node is None:
             return row  # one server alone: nothing to write
         with self._db.write() as c:
             return claim_take(c, row.id, owner)
 
     def takes(self, take_ids: Collection[str]) -> dict[str, live.LiveTakeRecord]:
-        """Those of these takes that are still there."""
+        """Those of these trials that still exist."""
         with self._db.read() as c:
             return live.find_many(c, take_ids)
 
     def admit(self, take_id: str, token: str) -> live.LiveTakeRecord | None:
-        """The take a token opens, over or not."""
+        """The trial with this token, ended or not."""
         with self._db.read() as c:
             return live.by_token(c, take_id, token)
 
     def take(self, take_id: str) -> live.LiveTakeRecord:
-        """One take; raises NotFound."""
+        """One trial; raises NotFound."""
         with self._db.read() as c:
             return live.get(c, take_id)
 
     def current(self, session_id: str) -> live.LiveTakeRecord | None:
-        """The session's newest take."""
+        """The session's latest trial."""
         with self._db.read() as c:
             return live.current(c, session_id)
 
     def open_take(self, session_id: str) -> live.LiveTakeRecord:
-        """The session's open take; raises NotFound, Conflict no_open_take."""
+        """The session's open trial; raises NotFound, Conflict no_open_take."""
         with self._db.read() as c:
             return live.require_open(c, session_id)
 
     def prepare(self, row: live.LiveTakeRecord) -> tuple[LiveTraining, list[live_events.LiveEvent]]:
-        """What a take is coached with, and what happened in it so far."""
+        """Training parameters of a trial, and its events so far."""
         training = training_of(self._db, self._reviewed, row)
         with self._db.read() as c:
             return training, live_events.events(c, row.id)
@@ -64,17 +64,17 @@ class Rows:
     def keep_command(
         self, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
     ) -> None:
-        """Append what a person did."""
+        """Append a user's command."""
         with self._db.write() as c:
             live_events.add_event(c, actor, take_id, kind, t_s, content)
 
     def start(self, take_id: str, source: str) -> None:
-        """Note the first batch; a take that was erased meanwhile is none."""
+        """Record the first batch; no effect if the trial has been erased."""
         with contextlib.suppress(NotFound), self._db.write() as c:
             live.note_start(c, take_id, source)
 
     def end(self, actor: audit.Actor | None, take_id: str, state: str, end: TakeEnd) -> live.LiveTakeRecord:
-        """End a take; raises NotFound when it was erased meanwhile."""
+        """End a trial; raises NotFound if it has been erased."""
         with self._db.write() as c:
             return live.end(
                 c, actor, take_id, state, count=end.count, sha256=end.sha256 or None, problem=end.problem
@@ -82,9 +82,9 @@ class Rows:
 
 
 def claim_take(c: Connection, take_id: str, owner: live.TakeOwner) -> live.LiveTakeRecord:
-    """Note that this start of a web server has a take from now on; raises NotFound, NodeAway.
+    """Assign a trial to this run of a web server; raises NotFound, NodeAway.
 
-    What a later start of it has claimed stays that one's.
+    A claim by a later run of the same server takes precedence.
     """
     this = live.get(c, take_id)
     owner.require(this)

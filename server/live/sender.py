@@ -1,4 +1,6 @@
-"""What a sender of the live protocol knows: batches not acknowledged, and where a connection is in them."""
+"""State of a sender of the live protocol: unacknowledged batches, and the position of a connection in
+them.
+"""
 
 from __future__ import annotations
 
@@ -22,21 +24,21 @@ from sagittal.core.formats.live_log import Finish, finish_json, read_batch_heade
 
 
 class LiveError(SagittalError):
-    """A stream that cannot go on; `code` is the server's or one of ours.
+    """The stream cannot continue; `code` is the server's or one of ours.
 
-    unreachable (nothing acknowledged for the whole patience), refused_connection, take_ended (by somebody
-    else), other_sender (the take holds batches this client never sent), acknowledged_lost (the server asks
-    for what it had acknowledged).
+    unreachable (nothing acknowledged before the timeout), refused_connection, take_ended (on the server),
+    other_sender (the trial contains batches of another client), acknowledged_lost (the server requests
+    batches it had acknowledged).
     """
 
 
 @dataclass(frozen=True)
 class StreamFaults:
-    """Troubles made on purpose.
+    """Faults injected for testing.
 
     Parameters
     ----------
-    drop : probability per batch that the connection is cut instead. jitter_s : longest delay of a batch.
+    drop : probability per batch of dropping the connection instead. jitter_s : maximum delay of a batch.
     """
 
     drop: float = 0.0
@@ -45,14 +47,14 @@ class StreamFaults:
 
 @dataclass
 class StreamReport:
-    """How a stream went.
+    """Statistics of a stream.
 
     Parameters
     ----------
-    sent : different batches. resent : sent once more after a connection ended. reconnects : after the first.
-    ack_s : per batch, from first sent to known to be on the server's disk.
-    sha256 : over all payloads. recording : id of what the server made of it, None before the finish.
-    problem : what the server found wrong with the finish (finish_mismatch), None = nothing.
+    sent : distinct batches. resent : repeated after a reconnect. reconnects : number of reconnects.
+    ack_s : per batch, time from first transmission to acknowledgement.
+    sha256 : over all payloads. recording : id of the stored recording, None before the finish.
+    problem : code of a problem at the finish (finish_mismatch), None = none.
     """
 
     sent: int = 0
@@ -64,7 +66,7 @@ class StreamReport:
     problem: str | None = None
 
     def ack_quantile(self, share: float) -> float:
-        """Time within which a share of the batches was acknowledged; NaN without any."""
+        """Quantile of the acknowledgement times; NaN without any."""
         ranked = sorted(self.ack_s)
         return ranked[min(len(ranked) - 1, int(share * len(ranked)))] if ranked else float("nan")
 
@@ -75,7 +77,7 @@ def _over(ws: ClientConnection, sending: asyncio.Task[None]) -> None:
 
 
 class Sender:
-    """Batches not acknowledged yet, and where in them this connection is."""
+    """Unacknowledged batches, and the position of this connection in them."""
 
     def __init__(
         self,
@@ -105,7 +107,7 @@ class Sender:
 
     @property
     def waiting(self) -> int:
-        """Batches that are not acknowledged."""
+        """Unacknowledged batches."""
         return len(self._kept)
 
     @property
@@ -113,7 +115,7 @@ class Sender:
         return self._acked + len(self._kept)
 
     def start(self, frames: AsyncIterable[bytes]) -> asyncio.Task[None]:
-        """Take the batches as they come from now on, connected or not."""
+        """Start buffering batches, connected or not."""
         self._producing = asyncio.create_task(self._produce(frames))
         self._producing.add_done_callback(lambda _: self._changed.set())
         return self._producing
@@ -128,7 +130,7 @@ class Sender:
         self.report.sha256 = self._hash.hexdigest()
 
     async def serve(self, ws: ClientConnection) -> None:
-        """Use one connection until the take is finished or the connection ends."""
+        """Send over one connection until the trial is finished or the connection ends."""
         self._welcome = False
         await ws.send(self._hello)
         while not self._welcome and not self.finished:
@@ -222,9 +224,9 @@ class Sender:
         self.report.recording, self.report.problem = str(message["recording"]), message.get("problem")
         self.finished = True
 
-    def _acknowledged(self, below: int) -> None:
+    def _acknowledged(self, seq: int) -> None:
         now = time.monotonic()
-        while self._acked < below and self._first_sent:
+        while self._acked < seq and self._first_sent:
             self._kept.popleft()
             self.report.ack_s.append(now - self._first_sent.popleft())
             self._acked += 1

@@ -1,4 +1,4 @@
-"""What the recorder alone knows of the sensors of a take: shown until the estimator judges them (wire.py)."""
+"""Sensor status from the recorder alone, shown until the estimator provides its own (wire.py)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from sagittal.server.live.messages import BATTERY_WARN_PCT
 def sensor_rows(
     hello: Hello, heard: Collection[int], battery: Mapping[str, float], *, silent: bool
 ) -> list[dict[str, Any]]:
-    """Rows as `health` of a frame has them; what only an estimator can count is None.
+    """Rows like `health` of a frame; values that require an estimator are None.
 
     Parameters
     ----------
-    heard : streams of which samples have come. battery : sensor id → percent. silent : nothing comes now.
+    heard : streams with samples. battery : sensor id → percent. silent : no data are being received.
     """
     rows = []
     for stream in hello.streams:

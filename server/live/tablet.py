@@ -1,6 +1,6 @@
-"""The tablet's socket: `WS /api/v1/live`, protocol sagittal.live.v1 (docs/reference/live-protocol.md).
+"""The tablet's websocket: `WS /api/v1/live`, protocol sagittal.live.v1 (docs/reference/live-protocol.md).
 
-Its door is the take's token in the first message; no cookie is looked at.
+Authorized by the trial's token in the first message; cookies are ignored.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ UNREAD: Final = 256
 
 
 class Tablet:
-    """What is on its way to one tablet; acknowledgements replace each other."""
+    """Outgoing messages of one tablet; later acknowledgements replace earlier ones."""
 
     def __init__(self, ws: WebSocket) -> None:
         self._ws = ws
@@ -44,17 +44,17 @@ class Tablet:
         self._wake = asyncio.Event()
 
     def say(self, text: str) -> None:
-        """Send a message, soon."""
+        """Queue a message."""
         self._texts.append(text)
         self._wake.set()
 
-    def ack(self, below: int) -> None:
-        """Acknowledge, soon."""
-        self._ack = below
+    def ack(self, seq: int) -> None:
+        """Queue an acknowledgement."""
+        self._ack = seq
         self._wake.set()
 
     def shut(self, code: int, reason: str) -> None:
-        """Send what is left and close."""
+        """Send queued messages and close."""
         self._closing = self._closing or (code, reason)
         self._wake.set()
 
@@ -63,9 +63,9 @@ class Tablet:
         while True:
             await self._wake.wait()
             self._wake.clear()
-            below, self._ack = self._ack, None
-            if below is not None:
-                await self._ws.send_text(protocol.ack(below))
+            seq, self._ack = self._ack, None
+            if seq is not None:
+                await self._ws.send_text(protocol.ack(seq))
             while self._texts:
                 await self._ws.send_text(self._texts.popleft())
             if self._closing is not None:
@@ -75,7 +75,7 @@ class Tablet:
 
 @router.websocket("/live", dependencies=[require(Action.STREAM)])
 async def stream(ws: WebSocket) -> None:
-    """Take the samples of one take."""
+    """Receive the samples of one live trial."""
     offered = ws.scope.get("subprotocols", [])
     await ws.accept(subprotocol=PROTOCOL if PROTOCOL in offered else None)
     hub: Hub = ws.app.state.hub
@@ -111,16 +111,16 @@ def _not_valid() -> ProtocolError:
 
 
 async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None:
-    """The take that the first message opens; None after a refusal, which is on its way then."""
+    """The trial named in the first message; None after an error, which has been queued."""
     try:
         async with asyncio.timeout(HELLO_WITHIN_S):
             message = await _message(ws)
         if message is None:
             raise WebSocketDisconnect
-        said = protocol.parse(message) if isinstance(message, str) else None
-        if not isinstance(said, Hello):
+        hello = protocol.parse(message) if isinstance(message, str) else None
+        if not isinstance(hello, Hello):
             raise ProtocolError("hello_missing", "The first message must be a hello.")
-        row = await asyncio.to_thread(hub.rows.admit, said.take, said.token)
+        row = await asyncio.to_thread(hub.rows.admit, hello.take, hello.token)
         if row is None:
             raise _not_valid()
         if not row.is_open:
@@ -128,7 +128,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
             return None
         if not hub.owner.has(row):
             await _carry(ws, hub, row, message)
-        take = await hub.enter(row, said)
+        take = await hub.enter(row, hello)
     except TimeoutError:
         _refuse(
             tablet, ProtocolError("no_hello", "No hello came in time; connect again.", CloseCode.NO_HELLO)
@@ -142,7 +142,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
     except InputError as error:
         _refuse(tablet, ProtocolError(error.code, error.message))
     else:
-        answer = take.recorder.greet(said)
+        answer = take.recorder.greet(hello)
         _heed(tablet, take, answer)
         if answer.close is None:
             hub.attach(take, tablet)
@@ -151,7 +151,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
 
 
 async def _carry(ws: WebSocket, hub: Hub, row: live.LiveTakeRecord, first: str | bytes) -> NoReturn:
-    """Carry the line to the web server that has the take, until it ends; raises NodeAway."""
+    """Relay the connection to the web server that owns the trial, until it ends; raises NodeAway."""
     node = None if ASKED_BY in ws.scope or row.node is None else hub.nodes.find(row.node)
     if node is None:
         raise NodeAway(row.node)
@@ -179,7 +179,7 @@ async def _receive(ws: WebSocket, take: ActiveTake, tablet: Tablet) -> None:
 
 
 def _heed(tablet: Tablet, take: ActiveTake, answer: IntakeAnswer) -> None:
-    """Do what the rules say of a message."""
+    """Carry out a response of the protocol state."""
     if answer.say is not None:
         tablet.say(answer.say)
     if answer.battery is not None:
@@ -191,7 +191,7 @@ def _heed(tablet: Tablet, take: ActiveTake, answer: IntakeAnswer) -> None:
 
 
 def _say_over(tablet: Tablet, row: live.LiveTakeRecord) -> None:
-    """Tell a tablet that comes back to a take that is over what became of it."""
+    """Tell a tablet reconnecting to an ended trial the outcome."""
     if row.recording_id is not None:
         tablet.say(protocol.announce_finish(row.recording_id, row.problem))
         tablet.shut(CloseCode.DONE if row.state == "finished" else CloseCode.ENDED, "take_ended")
@@ -205,7 +205,7 @@ def _refuse(tablet: Tablet, error: ProtocolError) -> None:
 
 
 async def _message(ws: WebSocket) -> str | bytes | None:
-    """The next message, None when the tablet has gone."""
+    """The next message, None if the tablet has disconnected."""
     event = await ws.receive()
     if event["type"] == "websocket.disconnect":
         return None

@@ -1,6 +1,6 @@
-"""One open take in the web process: its recorder, its tablet, what the therapist did, what browsers are told.
+"""One open live trial in the web process: recorder, tablet, therapist's commands and browser updates.
 
-Lives on the event loop; everything that waits for disk or database is the hub's.
+Runs on the event loop; disk and database access is left to the hub.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
 
 
 class TabletLink(Protocol):
-    """The way to a tablet (server/live/tablet.py)."""
+    """Connection to a tablet (server/live/tablet.py)."""
 
     def say(self, text: str) -> None:
         """Send a message."""
 
-    def ack(self, below: int) -> None:
+    def ack(self, seq: int) -> None:
         """Acknowledge all batches below this one."""
 
     def shut(self, code: int, reason: str) -> None:
@@ -47,7 +47,7 @@ class TabletLink(Protocol):
 
 
 class TakeRegistry(Protocol):
-    """What a take needs of the registry it belongs to (server/live/hub.py)."""
+    """Interface of the registry to its trials (server/live/hub.py)."""
 
     @property
     def pool(self) -> EstimatorPool:
@@ -55,21 +55,21 @@ class TakeRegistry(Protocol):
 
     @property
     def journal(self) -> Journal:
-        """Where events are kept."""
+        """Storage of events."""
 
     def note_started(self, take: ActiveTake) -> None:
-        """The first batch of this take has come."""
+        """The first batch of this trial has been received."""
 
     def note_ended(self, take: ActiveTake, end: TakeEnd) -> None:
-        """The end of this take is on the disk."""
+        """The end of this trial is durable."""
 
     def tell_state(self, take: ActiveTake) -> None:
-        """Tell the browsers where this take stands."""
+        """Send the state of this trial to browsers."""
 
 
 @dataclass(frozen=True)
 class TherapistMark:
-    """A moment the therapist marked."""
+    """A time marked by the therapist."""
 
     t_s: float | None
     value: str | None
@@ -77,7 +77,7 @@ class TherapistMark:
 
 @dataclass
 class TakeSteering:
-    """What people (and silence) did in a take so far, as its events say."""
+    """Commands and interruptions of a trial so far, from its events."""
 
     commands: list[Command] = field(default_factory=list)
     marks: list[TherapistMark] = field(default_factory=list)
@@ -86,7 +86,7 @@ class TakeSteering:
     stopping: bool = False
 
     def note_event(self, take_id: str, kind: str, t_s: float | None, content: Mapping[str, Any]) -> None:
-        """Take in one event."""
+        """Update from one event."""
         value = content.get("value")
         if kind in STEERING:
             self.commands.append(Command(take_id, int(content["before"]), kind, value))
@@ -103,11 +103,11 @@ class TakeSteering:
 
 
 class ActiveTake:
-    """A take that a tablet has spoken to.
+    """A live trial with a recorder.
 
     Parameters
     ----------
-    house : the registry it belongs to. row : as stored when it was entered.
+    house : its registry. row : as stored when it was opened.
     earlier : its events so far, after a restart of the server.
     """
 
@@ -151,7 +151,7 @@ class ActiveTake:
     # the socket
 
     def offer(self, message: bytes | str) -> IntakeAnswer:
-        """Hand a message to the recorder; never waits."""
+        """Pass a message to the recorder; never blocks."""
         answer = self.recorder.offer(message)
         if answer.keep is not None and self.state != "streaming" and answer.keep[0] == "B":
             self.state = "streaming"
@@ -162,41 +162,41 @@ class ActiveTake:
         return answer
 
     def charge(self, percent: Mapping[str, float]) -> None:
-        """Show the battery."""
+        """Show battery levels."""
         self._battery |= percent
         self._house.pool.send(Charge(self.id, dict(percent)))
 
     # the recorder's listener
 
     def note_growth(self, size: int) -> None:
-        """The log can be read so far; if it was longer before, what was read of it is read again."""
+        """The log is readable up to `size`; if it was longer before, it is processed again from the start."""
         self.grown_at = time.monotonic()
-        before, self._size = self._size, size
-        if size < before:
+        previous, self._size = self._size, size
+        if size < previous:
             self._house.pool.follow(self.id)
         else:
             self._house.pool.grow(self.id, size)
         if self.steered.stale and not self._house.pool.follows(self.id):
             self.mind_silence(False)
 
-    def note_acknowledged(self, below: int) -> None:
-        """Batches are on the disk."""
+    def note_acknowledged(self, seq: int) -> None:
+        """Batches are durable."""
         if self.tablet is not None:
-            self.tablet.ack(below)
+            self.tablet.ack(seq)
 
     def note_end(self, end: TakeEnd) -> None:
-        """The end is on the disk."""
+        """The end is durable."""
         self._house.note_ended(self, end)
 
     def note_failure(self, error: ProtocolError) -> None:
-        """Note that the disk refuses."""
+        """A disk error occurred."""
         if self.tablet is not None:
             self.tablet.shut(error.close, error.code)
 
     # the estimator
 
     def begin(self) -> FollowTake:
-        """The order to follow this take from its start."""
+        """Order to process this trial from its start."""
         t = self.training
         return FollowTake(
             self.id,
@@ -210,7 +210,7 @@ class ActiveTake:
         )
 
     def steer(self, name: str, value: Any, t_s: float | None) -> dict[str, Any]:
-        """Give a command from the next batch on and return the content of its event, which is at `t_s`."""
+        """Issue a command from the next batch on; return the content of its event, which is at `t_s`."""
         content: dict[str, Any] = {"value": value}
         if name in STEERING:
             content["before"] = self.recorder.next_seq
@@ -220,7 +220,7 @@ class ActiveTake:
         return content
 
     def show(self, picture: Picture) -> None:
-        """Pass a picture on."""
+        """Forward a picture."""
         self.t_s = picture.t_s
         if self.stage == "running" and picture.stage != "running":
             self.room.forget_strides()
@@ -236,14 +236,14 @@ class ActiveTake:
             self.mind_silence(False)
 
     def tell_stage(self) -> None:
-        """Tell the tablet where the estimation stands."""
+        """Send the stage of the estimation to the tablet."""
         if self.tablet is not None and self.stage is not None:
             self.tablet.say(protocol.state(self.stage, self.say))
             if self.stage == "running" and self._verdict is not None:
                 self.tablet.say(protocol.judge_calibration(self._verdict))
 
     def tell(self, item: FeedItem) -> None:
-        """Pass on what happens once; what a new process says again is known already."""
+        """Forward a one-time event, unless a restarted process repeats it."""
         if item.kind == "stride":
             self.room.keep_stride(item.body)
         elif item.kind == "cue":
@@ -262,25 +262,25 @@ class ActiveTake:
             self._house.journal.add(self.id, item.kind, item.t_s, content)
 
     def _judge(self, verdict: Mapping[str, Any] | None) -> None:
-        """Keep the verdict of a calibration and tell the tablet."""
+        """Store the outcome of a calibration and send it to the tablet."""
         self._verdict = verdict
         if verdict is not None and self.tablet is not None:
             self.tablet.say(protocol.judge_calibration(verdict))
 
     def look(self, now: float) -> None:
-        """Notice that the tablet has fallen silent."""
+        """Detect that the tablet has stopped sending."""
         if self.state == "streaming" and now - self.grown_at > STALE_S:
             self.mind_silence(True)
 
     def mind_silence(self, stale: bool) -> None:
-        """Feedback pauses while data are stale; where it did is kept, so that a replay pauses there too."""
+        """Pause feedback while data are stale; pauses are stored, so that a replay reproduces them."""
         if stale != self.steered.stale:
             content = self.steer("stale", stale, self.t_s)
             if self.training.prescription is not None:
                 self._house.journal.add(self.id, "stale", self.t_s, content)
 
     def standing(self) -> dict[str, Any]:
-        """The state for the browsers: clock and sensors are the recorder's, whoever estimates or not."""
+        """State for browsers; time and sensors come from the recorder, independent of the estimator."""
         elapsed = self.recorder.elapsed_s
         silent = time.monotonic() - self.grown_at > STALE_S
         return {
@@ -303,7 +303,7 @@ class ActiveTake:
 
 
 def describe_unjoined(row: LiveTakeRecord | None) -> dict[str, Any]:
-    """The same of a take that no tablet has joined yet or that is over; None = there was none."""
+    """State of a trial that has no tablet yet or has ended; None = there was none."""
     return {
         "type": "state",
         "take": None if row is None else row.id,

@@ -1,6 +1,6 @@
-"""What browsers get: live frames, strides, cues and notices as JSON, angles in degrees, undefined is null.
+"""JSON for browsers: live frames, strides, cues and notices, angles in degrees, undefined is null.
 
-Runs in the estimator process; the web process passes the bytes on.
+Runs in the estimator process; the web process forwards the bytes.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
 from sagittal.server.report.view.calibration_checks import say_verdict
 from sagittal.server.report.view.functional import segment_label
 from sagittal.server.report.words.guided_words import tell_person
 from sagittal.server.report.words.wording import place_words, reason_words, speak_places
-from sagittal.web.user_text import encode_user_text
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
 """Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
@@ -55,56 +55,59 @@ encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
 
 
 def frame(
-    shown: LiveFrame, trail: Iterable[AngleTrail], slow: Mapping[str, Any], phase: Mapping[Side, float | None]
+    live_frame: LiveFrame,
+    trail: Iterable[AngleTrail],
+    slow: Mapping[str, Any],
+    phase: Mapping[Side, float | None],
 ) -> bytes:
-    """A frame with the angles since the last one that was sent, without the closing brace.
+    """A frame with the angles since the last one sent, without the closing brace.
 
     Parameters
     ----------
-    trail : of this frame and those before it that were not sent. slow : its `slow_part`, or an earlier one.
-    phase : per side the share of the running cycle, 0 to 100, None where unknown.
+    trail : angles of this frame and earlier unsent ones. slow : its `slow_part`, or an earlier one.
+    phase : percentage of the current cycle per side, 0 to 100, None if unknown.
     """
     body = {
         "type": "frame",
-        "t": _number(shown.t_s, 3),
-        "stage": shown.stage,
-        "method": shown.method,
-        "angles_deg": {name: _number(value * _DEGREES, 2) for name, value in shown.angles.items()},
+        "t": _number(live_frame.t_s, 3),
+        "stage": live_frame.stage,
+        "method": live_frame.method,
+        "angles_deg": {name: _number(value * _DEGREES, 2) for name, value in live_frame.angles.items()},
         "trace": _trace(trail),
         "phase": {SUFFIX[side]: _number(phase.get(side), 1) for side in SIDES},
-        "contact": {SUFFIX[side]: bool(shown.contact.get(side, False)) for side in SIDES},
+        "contact": {SUFFIX[side]: bool(live_frame.contact.get(side, False)) for side in SIDES},
         **slow,
     }
     return encode(body)[:-1]
 
 
 def slow_part(
-    shown: LiveFrame,
+    live_frame: LiveFrame,
     battery: Mapping[str, float],
     guided: GuidedTestView | None = None,
     calibration: msgspec.Raw | None = None,
 ) -> dict[str, Any]:
-    """What of a frame is for reading and need not be made anew for every one: calibration, sensors, test.
+    """Parts of a frame that change slowly and are reused: calibration, sensors, test.
 
     Parameters
     ----------
-    calibration : its `describe_calibration`, where that has been made.
+    calibration : result of `describe_calibration`, if available.
     """
-    health = [_health(row, battery.get(row.id)) for row in shown.health]
+    health = [_health(row, battery.get(row.id)) for row in live_frame.health]
     return {
         "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
-        "calibration": calibration or describe_calibration(shown.calibration),
+        "calibration": calibration or describe_calibration(live_frame.calibration),
         "health": msgspec.Raw(encode(health)),
     }
 
 
 def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
-    """Where calibration stands."""
+    """State of the calibration."""
     return msgspec.Raw(encode(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
-    """Where a functional test stands; its figures are those of the catalogue, in its units."""
+    """State of a functional test, with results in units of the catalogue."""
     result = view.result
     return {
         "phase": view.phase,
@@ -139,76 +142,84 @@ def _segment(part: TimedSegment) -> dict[str, Any]:
     }
 
 
-def pose(shown: LiveFrame) -> FigurePose | None:
-    """The figure of a frame, None while there is none."""
-    segments = [name for name in shown.q if name in shown.p]
+def pose(live_frame: LiveFrame) -> FigurePose | None:
+    """Pose of the avatar in a frame, None if unavailable."""
+    segments = [name for name in live_frame.q if name in live_frame.p]
     if not segments:
         return None
     return FigurePose(
         list(segments),
-        np.array([shown.q[s] for s in segments], np.float32).tobytes(),
-        np.array([shown.p[s] for s in segments], np.float32).tobytes(),
-        shown.valid,
-        {side: bool(on) for side, on in shown.contact.items()},
+        np.array([live_frame.q[s] for s in segments], np.float32).tobytes(),
+        np.array([live_frame.p[s] for s in segments], np.float32).tobytes(),
+        live_frame.valid,
+        {side: bool(on) for side, on in live_frame.contact.items()},
     )
 
 
-def stride(told: LiveStride) -> dict[str, Any]:
-    """A stride; it comes again with the same `n` when its end is refined or its distances are known."""
-    duration = told.end_s - told.start_s
-    off = None if told.foot_off_s is None else 100.0 * (told.foot_off_s - told.start_s) / duration
+def stride(live_stride: LiveStride) -> dict[str, Any]:
+    """A stride; sent again with the same `n` when its end is refined or its distances become available."""
+    duration = live_stride.end_s - live_stride.start_s
+    off = (
+        None
+        if live_stride.foot_off_s is None
+        else 100.0 * (live_stride.foot_off_s - live_stride.start_s) / duration
+    )
     return {
         "type": "stride",
-        "n": told.n,
-        "side": told.side,
-        "start_s": _number(told.start_s, 4),
-        "end_s": _number(told.end_s, 4),
-        "detected_s": _number(told.detected_s, 4),
+        "n": live_stride.n,
+        "side": live_stride.side,
+        "start_s": _number(live_stride.start_s, 4),
+        "end_s": _number(live_stride.end_s, 4),
+        "detected_s": _number(live_stride.detected_s, 4),
         "foot_off_pct": _number(off, 2),
-        "values": {name: _number(value, 5) for name, value in told.values.items()},
-        "reasons": dict(told.reasons),
-        "curves_deg": _curves(told.curves),
-        "flags": list(told.flags),
-        "counted": told.counted,
-        "complete": told.complete,
+        "values": {name: _number(value, 5) for name, value in live_stride.values.items()},
+        "reasons": dict(live_stride.reasons),
+        "curves_deg": _curves(live_stride.curves),
+        "flags": list(live_stride.flags),
+        "counted": live_stride.counted,
+        "complete": live_stride.complete,
     }
 
 
-def cue(given: Cue) -> dict[str, Any]:
-    """Message of a cue for the screens."""
-    return {"type": "cue", **given.to_json()}
+def cue(live_cue: Cue) -> dict[str, Any]:
+    """Message of a cue for screens."""
+    return {"type": "cue", **live_cue.to_json()}
 
 
 def feedback(state: FeedbackState) -> dict[str, Any]:
-    """Where the feedback stands."""
+    """State of the feedback."""
     return {"type": "feedback", **state.to_json()}
 
 
-def announce_calibration(shown: LiveFrame) -> dict[str, Any]:
-    """That calibration has come to an end, and how."""
-    return {"type": "calibration", "method": shown.method, "calibration": _calibration(shown.calibration)}
-
-
-def notice(given: Notice) -> dict[str, Any]:
-    """A notice in the words of the pages."""
-    return {"type": "notice", **_notice(given)}
-
-
-def _notice(given: Notice) -> dict[str, Any]:
-    words = speak_places(given.message)
+def announce_calibration(live_frame: LiveFrame) -> dict[str, Any]:
+    """Message that calibration has ended, with its outcome."""
     return {
-        "severity": _SEVERITY[given.severity],
+        "type": "calibration",
+        "method": live_frame.method,
+        "calibration": _calibration(live_frame.calibration),
+    }
+
+
+def notice(live_notice: Notice) -> dict[str, Any]:
+    """A notice in the wording of the pages."""
+    return {"type": "notice", **_notice(live_notice)}
+
+
+def _notice(live_notice: Notice) -> dict[str, Any]:
+    words = speak_places(live_notice.message)
+    return {
+        "severity": _SEVERITY[live_notice.severity],
         "text": words,
         "message": words,
-        "code": given.code,
-        "sensor": given.sensor,
-        "t_s": _number(given.t_s, 3),
+        "code": live_notice.code,
+        "sensor": live_notice.sensor,
+        "t_s": _number(live_notice.t_s, 3),
     }
 
 
 def judge_calibration(score: CalibrationScore) -> dict[str, Any]:
-    """The verdict in words: of every failed check where, why and what to do."""
-    said = [c.to_json() for c in score.checks]
+    """Outcome of a calibration in words: location, reason and remedy of each failed check."""
+    rows = [c.to_json() for c in score.checks]
     redo = [
         {
             "place": "" if c.segment is None else place_words(c.segment),
@@ -219,7 +230,7 @@ def judge_calibration(score: CalibrationScore) -> dict[str, Any]:
         for c in score.checks
         if c.verdict == "redo"
     ]
-    return {"verdict": score.verdict, "headline": say_verdict(score.verdict, said), "redo": redo}
+    return {"verdict": score.verdict, "headline": say_verdict(score.verdict, rows), "redo": redo}
 
 
 def _calibration(view: CalibrationView | None) -> dict[str, Any] | None:
@@ -262,7 +273,7 @@ def _health(row: SensorHealth, battery_pct: float | None) -> dict[str, Any]:
 
 
 def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
-    """Worst first: state and words of a sensor; no words while all is well."""
+    """State and messages of a sensor, worst first; no messages if it is fine."""
     if row.segment is None:
         return "none", "not used"
     if row.silent_s > STALE_S:

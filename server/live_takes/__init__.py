@@ -1,1 +1,1 @@
-"""Live takes: opened, logged, coached, filmed, and stored as recordings when they end."""
+"""Live trials: opening, logging, feedback, video, and conversion to recordings."""

@@ -1,9 +1,9 @@
-"""The film of a tablet's camera beside a live take: its pieces on their way in, and what becomes of them.
+"""Videos recorded by the tablet's camera during live trials: chunked upload and storage.
 
-A piece is acknowledged when it is on the disk, numbered, and may come twice; a gap is refused, so that the
-tablet sends again from where the server stands. The pieces wait in `live/<take>.film`, in the records of a
-live log, and go with the take's other files when it is erased. Once the take is a recording they stand beside
-it as an uploaded video would, aligned by the tablet's clock, which stamps pictures and samples alike.
+Chunks are numbered and acknowledged when on disk. Repeated chunks are accepted; gaps are rejected, so that
+the tablet resumes at the server's position. Chunks are stored in `live/<take>.film` in the record format of a
+live log, and erased with the trial's other files. Once the trial is a recording, the video is attached to it
+like an uploaded one, aligned by the tablet's clock, which stamps frames and samples alike.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ MOST_PIECE_BYTES: Final = MOST_FRAME_BYTES
 
 
 class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
-    """The token opens no such take, or has expired."""
+    """The token matches no such trial, or has expired."""
 
     status = 401
 
@@ -51,11 +51,11 @@ class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
 
 @dataclass(frozen=True)
 class FilmProgress:
-    """How far the server has a film.
+    """Progress of a video upload.
 
     Parameters
     ----------
-    next_piece : number of the piece it waits for; all below are on its disk. limit_bytes : of the whole film.
+    next_piece : number of the next chunk; all below are on disk. limit_bytes : maximum size of the video.
     """
 
     next_piece: int
@@ -71,14 +71,14 @@ class _OpenFilm:
 
 @dataclass(frozen=True)
 class _FilmHead:
-    """What a film begins with: when its first picture was taken, the tablet's clock, and the consent."""
+    """Header of a video: time of the first frame by the tablet's clock, and consent."""
 
     began_us: int
     consent_at: dt.datetime
 
 
 class FilmIntake:
-    """Films that are coming in; one per web process, called from its threads."""
+    """Videos being received; one per web process, called from its threads."""
 
     def __init__(self, settings: Settings, db: Database, blobs: BlobStore) -> None:
         self._settings, self._db, self._blobs = settings, db, blobs
@@ -87,7 +87,7 @@ class FilmIntake:
         self._lock, self._settling = threading.Lock(), threading.Lock()
 
     def begin(self, take_id: str, token: str, began_us: int, *, consent: bool) -> FilmProgress:
-        """Begin a film, or say how far one is that has begun.
+        """Start a video, or return the progress of one already started.
 
         Raises
         ------
@@ -111,7 +111,7 @@ class FilmIntake:
             return self._say(film)
 
     def add(self, take_id: str, token: str, number: int, piece: bytes) -> FilmProgress:
-        """Keep a piece; when this returns it survives a power cut. One that is there already is left out.
+        """Store a chunk durably; an existing one is skipped.
 
         Raises
         ------
@@ -129,11 +129,11 @@ class FilmIntake:
             return self._say(film)
 
     def end(self, take_id: str, token: str) -> bool:
-        """The film is complete: set it beside its take; tell whether there is one, also when asked again.
+        """Attach a complete video to its trial; return whether there is one, also when repeated.
 
         Raises
         ------
-        TokenNotValid; Conflict take_open: the take is not a recording yet, ask again.
+        TokenNotValid; Conflict take_open: the trial is not a recording yet; retry later.
         """
         take = self._admit(take_id, token)
         with self._lock:
@@ -148,7 +148,7 @@ class FilmIntake:
             return videos.find(c, take.session_id) is not None
 
     def close(self) -> None:
-        """Let go of all files; the films go on when the server is there again."""
+        """Close all files; uploads resume when the server is back."""
         with self._lock:
             for film in self._open.values():
                 film.log.close()
@@ -163,7 +163,7 @@ class FilmIntake:
         return take
 
     def _find(self, take_id: str) -> _OpenFilm | None:
-        """A film that is open, or was left by the process before."""
+        """An open video, or one left by an earlier process."""
         path = film_path(self._settings.live, take_id)
         film = self._open.get(take_id)
         if film is None and path.exists():
@@ -195,25 +195,25 @@ class FilmIntake:
 
 
 def film_path(folder: Path, take_id: str) -> Path:
-    """Where a film is while it does not stand beside its take."""
+    """Path of a video before it is attached to its trial."""
     return folder / f"{take_id}.film"
 
 
 def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bool:
-    """Set what has come of a film beside its take; without a recording, or a picture, it is discarded.
+    """Attach a received video to its trial; discard it if there is no recording or frame.
 
     Parameters
     ----------
-    path : of the film, named by the take, beside its log.
+    path : of the video, named after the trial, in the folder of its log.
 
     Returns
     -------
-    Whether it stands beside the take.
+    Whether the video was attached.
 
     Raises
     ------
-    Conflict take_open while the take is not over and stored. NotFound the take: the film is left as it is,
-    since the database may have been put back from a backup.
+    Conflict take_open until the trial has ended and is stored. NotFound the trial: the video is retained,
+    since the database may have been restored from a backup.
     """
     take_id = path.stem
     with db.read() as c:
@@ -223,18 +223,18 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bo
     if take.is_open or (not stored and live_recordings.log_path(path.parent, take_id).exists()):
         raise Conflict("take_open", "The take is not over and stored yet; ask again in a moment.")
     try:
-        kept = stored and _keep(db, blobs, settings, opener, take, path)
-        if not kept:
+        attached = stored and _keep(db, blobs, settings, opener, take, path)
+        if not attached:
             with db.write() as c:
                 audit.record(c, None, "video.discarded", "session", take.session_id, {"take_id": take_id})
     except NotFound:
-        kept = False  # erased meanwhile
+        attached = False  # erased meanwhile
     fs.remove_file(path)
-    return kept
+    return attached
 
 
 def settle_abandoned(db: Database, blobs: BlobStore, settings: Settings) -> None:
-    """Settle films whose tablet has not come back for so long that no token opens its take any more."""
+    """Settle videos whose tablet has been absent for longer than tokens of its trial are valid."""
     limit = now().timestamp() - live.TOKEN_LIFE.total_seconds()
     for path in sorted(one for folder in settings.live_folders for one in folder.glob("*.film")):
         try:
@@ -281,7 +281,7 @@ def _keep(
 def _find_offset_s(
     db: Database, blobs: BlobStore, take: live.LiveTakeRecord, head: _FilmHead
 ) -> float | None:
-    """Time in the film at the take's time 0, by the tablet's clock."""
+    """Video time at trial time 0, by the tablet's clock."""
     if take.recording_id is None:
         return None
     with db.read() as c:
@@ -304,8 +304,8 @@ def _read_pieces(path: Path) -> Iterator[bytes]:
 
 def _read_head(path: Path) -> _FilmHead | None:
     for _, one in segments.read_records(path):
-        said: Any = read_json(one.body) if one.kind == "H" else None
+        head: Any = read_json(one.body) if one.kind == "H" else None
         with contextlib.suppress(TypeError, KeyError, ValueError):
-            return _FilmHead(int(said["began_us"]), dt.datetime.fromisoformat(said["consent_at"]))
+            return _FilmHead(int(head["began_us"]), dt.datetime.fromisoformat(head["consent_at"]))
         break
     return None

@@ -1,4 +1,4 @@
-"""Live takes: opened for a session, joined to a tablet by a code, ended; the log then becomes a recording.
+"""Live trials: opened for a session, joined by a tablet with a code, ended, and stored as a recording.
 
     pairing ──code──> open ──first batch──> streaming ──finish──> finished
        └───────────────┴───────── close ────────┴────────────────> closed
@@ -36,16 +36,16 @@ TOKEN_LIFE = dt.timedelta(hours=12)
 
 @dataclass(frozen=True)
 class LiveTakeRecord:
-    """A live take of a session.
+    """A live trial of a session.
 
     Parameters
     ----------
-    state : pairing (waits for a tablet), open (paired), streaming (samples are coming or came), finished (the
-        tablet ended it), closed (ended here). source : what the tablet streams, None before its first.
-    count, sha256 : batches and the tablet's digest of their payloads, at the end.
-    recording_id : what the take became; None while it runs and when nothing came.
-    problem : code of what was wrong at the end, finish_mismatch or node_away.
-    node, node_run : the web server that has its log and which start of it; None = one without a name.
+    state : pairing (waiting for a tablet), open (paired), streaming (samples received), finished (by the
+        tablet), closed (on the server). source : data source of the tablet, None before its hello.
+    count, sha256 : number of batches and the tablet's digest of their payloads, at the end.
+    recording_id : the resulting recording; None while running or if nothing was received.
+    problem : code of a problem at the end, finish_mismatch or node_away.
+    node, node_run : the web server that has its log, and its run; None = a server without a name.
     """
 
     id: str
@@ -67,23 +67,23 @@ class LiveTakeRecord:
 
     @property
     def is_open(self) -> bool:
-        """Whether samples may still come."""
+        """Whether more samples may be received."""
         return self.state in OPEN_TAKE_STATES
 
 
 @dataclass(frozen=True)
 class TakeOwner:
-    """A web server as the owner of live takes; without a name it serves alone and every take is its own."""
+    """A web server as the owner of live trials; an unnamed server owns all trials."""
 
     node: str | None = None
     run: int | None = None
 
     def has(self, take: LiveTakeRecord) -> bool:
-        """Whether a take is this one's, or nobody's."""
+        """Whether a trial belongs to this server or is unassigned."""
         return self.node is None or take.node in (None, self.node)
 
     def require(self, take: LiveTakeRecord) -> None:
-        """Raise NodeAway of a take that another one has."""
+        """Raise NodeAway if another server owns the trial."""
         if not self.has(take):
             raise NodeAway(take.node)
 
@@ -93,7 +93,7 @@ ALONE = TakeOwner()
 
 @dataclass(frozen=True)
 class TabletAccess:
-    """What a tablet gets for a code; the token opens this take only."""
+    """Credentials that a tablet receives for a code; the token is valid for this trial only."""
 
     token: str
     take: str
@@ -107,7 +107,7 @@ class TabletAccess:
 def open_take(
     c: Connection, actor: audit.Actor | None, session_id: str, owner: TakeOwner = ALONE
 ) -> tuple[LiveTakeRecord, str]:
-    """Open a take of this web server and return it with its code; raises NotFound, Conflict take_open."""
+    """Open a trial on this web server; return it with its code; raises NotFound, Conflict take_open."""
     sessions.get(c, session_id)
     earlier = current(c, session_id)
     if earlier is not None and earlier.is_open:
@@ -132,7 +132,7 @@ def open_take(
 
 
 def new_code(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple[LiveTakeRecord, str]:
-    """Give another code; a tablet that is already joined stays so until this code is used."""
+    """Issue another code; a joined tablet remains connected until it is used."""
     this = require_open(c, session_id)
     code = _new_code()
     c.execute(update(live_take).where(live_take.c.id == this.id).values(**_code_columns(code)))
@@ -141,7 +141,7 @@ def new_code(c: Connection, actor: audit.Actor | None, session_id: str) -> tuple
 
 
 class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
-    """A pairing code is unknown, used or expired: one answer, nothing to learn by guessing."""
+    """The pairing code is unknown, used or expired, without distinction."""
 
     status = 404
 
@@ -153,16 +153,16 @@ class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
 
 
 def pair(c: Connection, code: str) -> TabletAccess:
-    """Use a code up; raises CodeNotValid. The caller counts the failures (server/auth/throttle.py)."""
+    """Consume a code; raises CodeNotValid. The caller counts failures (server/auth/throttle.py)."""
     plain = "".join(code.split()).replace("-", "").upper()
-    token, at = new_token(), now()
+    token, issued_at = new_token(), now()
     row = c.execute(
         select(live_take.c.id, live_take.c.session_id, live_take.c.state, session.c.title, patient.c.code)
         .join(session, session.c.id == live_take.c.session_id)
         .join(patient, patient.c.id == session.c.patient_id)
         .where(
             live_take.c.code_sha256 == token_hash(plain),
-            live_take.c.code_expires_at > at,
+            live_take.c.code_expires_at > issued_at,
             live_take.c.state.in_(OPEN_TAKE_STATES),
         )
     ).first()
@@ -173,7 +173,7 @@ def pair(c: Connection, code: str) -> TabletAccess:
         "code_sha256": None,
         "code_expires_at": None,
         "token_sha256": token_hash(token),
-        "token_expires_at": at + TOKEN_LIFE,
+        "token_expires_at": issued_at + TOKEN_LIFE,
     }
     c.execute(update(live_take).where(live_take.c.id == row.id).values(values))
     audit.record(c, None, "live.paired", "session", row.session_id, {"take_id": row.id})
@@ -182,7 +182,7 @@ def pair(c: Connection, code: str) -> TabletAccess:
 
 
 def by_token(c: Connection, take_id: str, token: str) -> LiveTakeRecord | None:
-    """The take that this token opens, over or not; None when the token is unknown, expired or another's."""
+    """The trial of this token, ended or not; None if the token is unknown or expired."""
     row = c.execute(
         select(live_take.c.token_sha256, live_take.c.token_expires_at).where(live_take.c.id == take_id)
     ).first()
@@ -192,7 +192,7 @@ def by_token(c: Connection, take_id: str, token: str) -> LiveTakeRecord | None:
 
 
 def note_start(c: Connection, take_id: str, source: str) -> LiveTakeRecord:
-    """Note the first samples."""
+    """Record the first samples."""
     c.execute(
         update(live_take)
         .where(live_take.c.id == take_id, live_take.c.state.in_(("pairing", "open")))
@@ -211,7 +211,7 @@ def end(
     sha256: str | None = None,
     problem: str | None = None,
 ) -> LiveTakeRecord:
-    """End a take as finished or closed; one that is over stays as it is."""
+    """End a trial as finished or closed; no effect if it has ended."""
     changed = c.execute(
         update(live_take)
         .where(live_take.c.id == take_id, live_take.c.state.in_(OPEN_TAKE_STATES))
@@ -241,19 +241,19 @@ def get(c: Connection, take_id: str) -> LiveTakeRecord:
 
 
 def find_many(c: Connection, take_ids: Collection[str]) -> dict[str, LiveTakeRecord]:
-    """Those of these takes that are there, by id."""
+    """Those of these trials that exist, by id."""
     rows = c.execute(_QUERY.where(live_take.c.id.in_(take_ids)))
     return {row.id: LiveTakeRecord(**row._asdict()) for row in rows}
 
 
 def current(c: Connection, session_id: str) -> LiveTakeRecord | None:
-    """The session's newest take, None before the first."""
+    """The session's latest trial, None before the first."""
     row = c.execute(_NEWEST, {"of_session": session_id}).first()
     return None if row is None else LiveTakeRecord(**row._asdict())
 
 
 def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
-    """The session's open take; raises NotFound, Conflict no_open_take."""
+    """The session's open trial; raises NotFound, Conflict no_open_take."""
     sessions.get(c, session_id)
     this = current(c, session_id)
     if this is None or not this.is_open:
@@ -262,9 +262,9 @@ def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
 
 
 def list_running(c: Connection) -> list[LiveTakeRecord]:
-    """All takes that receive samples or may at any moment, those that receive them last.
+    """All trials that receive samples or may do so at any moment, the former last.
 
-    One whose code expired before a tablet paired is not among them.
+    Excludes those whose code expired before a tablet joined.
     """
     waiting = (live_take.c.state == "pairing") & (live_take.c.code_expires_at > now())
     query = _QUERY.where(live_take.c.state.in_(("open", "streaming")) | waiting)
@@ -273,7 +273,7 @@ def list_running(c: Connection) -> list[LiveTakeRecord]:
 
 
 def takes_of(c: Connection, session_id: str) -> list[LiveTakeRecord]:
-    """All takes of a session, the oldest first."""
+    """All trials of a session, oldest first."""
     query = _QUERY.where(live_take.c.session_id == session_id)
     return [LiveTakeRecord(**row._asdict()) for row in c.execute(query.order_by(live_take.c.created_at))]
 

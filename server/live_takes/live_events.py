@@ -1,4 +1,4 @@
-"""What happened in a live take, in order: commands and their values, cues, notices, damages of its log."""
+"""Event log of a live trial: commands and their values, cues, notices, damage of its log."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ COMMANDS = (
 
 @dataclass(frozen=True)
 class LiveEvent:
-    """Something that happened in a take: a command, a cue, a calibration, a notice, a change of state."""
+    """An event of a live trial: a command, cue, calibration, notice or change of state."""
 
     seq: int
     take_id: str
@@ -39,7 +39,7 @@ class LiveEvent:
 
 
 def check_value(name: str, value: object) -> None:
-    """Refuse a command's value that cannot be obeyed; raises ServiceError bad_value."""
+    """Validate a command's value; raises ServiceError bad_value."""
     if name in ("feedback", "pause"):
         ok, expected = isinstance(value, bool), "true or false"
     elif name == "level":
@@ -57,7 +57,7 @@ def check_value(name: str, value: object) -> None:
 
 
 def _are_limits(value: object) -> bool:
-    """Whether these are a start and an end of a functional test."""
+    """Whether these are start and end of a functional test."""
     if not isinstance(value, Mapping) or set(value) != {"start_s", "end_s"}:
         return False
     try:
@@ -68,16 +68,16 @@ def _are_limits(value: object) -> bool:
 
 
 def read_test_limits(c: Connection, take_id: str) -> dict[str, float] | None:
-    """What was said last of when the functional test of a take began and ended; a repetition drops it."""
-    said = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
-    last = said[-1] if said else None
+    """Latest start and end set for the functional test of a trial; cleared by a repetition."""
+    limits = [e.content["value"] for e in events(c, take_id) if e.kind == "test"]
+    last = limits[-1] if limits else None
     return dict(last) if isinstance(last, Mapping) else None
 
 
 def add_event(
     c: Connection, actor: audit.Actor | None, take_id: str, kind: str, t_s: float | None, content: object
 ) -> int:
-    """Append what happened and return its number."""
+    """Append an event and return its number."""
     row = {
         "take_id": take_id,
         "kind": kind,
@@ -93,7 +93,7 @@ def add_event(
 
 
 def events(c: Connection, take_id: str) -> list[LiveEvent]:
-    """Everything that happened in a take, in order."""
+    """All events of a trial, in order."""
     query = (
         select(*_EVENT_COLUMNS, user.c.display_name.label("by"))
         .join(user, user.c.id == live_event.c.user_id, isouter=True)
@@ -104,17 +104,17 @@ def events(c: Connection, take_id: str) -> list[LiveEvent]:
 
 
 def own_notice(code: str, text: str) -> dict[str, str]:
-    """Content of a notice that the server itself has to give, not the estimator."""
+    """Content of a notice issued by the server itself rather than the estimator."""
     return {"code": code, "text": text, "severity": "bad", "from": "server"}
 
 
 def is_own_notice(content: Mapping[str, Any]) -> bool:
-    """Whether an event's content is one of `own_notice`."""
+    """Whether an event's content was created by `own_notice`."""
     return content.get("from") == "server"
 
 
 def list_damages(c: Connection, session_id: str) -> list[str]:
-    """What was lost of a session's live takes because the disk damaged their logs, as sentences."""
+    """Losses in a session's live trials due to damaged logs, as sentences."""
     return list(c.execute(_DAMAGES, {"of_session": session_id}).scalars())
 
 

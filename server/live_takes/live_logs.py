@@ -1,7 +1,7 @@
-"""The logs of all web servers: what they hold, which the database knows, and adopting a stranger.
+"""Logs of all web servers: their content, whether the database knows them, and adoption of unknown ones.
 
-A log may outlive its row: the database was put back from a backup. It is kept until somebody adopts it or
-removes it by hand.
+A log may lack a row after the database was restored from a backup. It is retained until it is adopted or
+removed manually.
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ class LiveLog:
 
     Parameters
     ----------
-    known : whether the database has its take. written_at : when the last batch came. batches : whole ones.
-    span_s : time between the first and the last of them, None with fewer than two. sensors : how many.
-    damage : what cannot be read behind them, None = nothing.
+    known : whether its trial is in the database. written_at : time of the last batch. batches : complete
+        ones.
+    span_s : time between the first and the last of them, None with fewer than two. sensors : their number.
+    damage : unreadable data after the batches, None = none.
     """
 
     take_id: str
@@ -54,23 +55,23 @@ class LiveLog:
 
     @property
     def words(self) -> str:
-        """What it holds, for people."""
+        """Description of its content."""
         long = "" if self.span_s is None else f", {self.span_s:.0f} s"
         return f"{self.written_at:%Y-%m-%d %H:%M}Z, {self.sensors} sensors, {self.batches} batches{long}"
 
 
 def list_logs(c: Connection, settings: Settings) -> Iterator[LiveLog]:
-    """Every log in `live/`, by name; one that vanishes meanwhile (its take has ended) is passed over."""
+    """All logs in `live/`, by name; one that disappears meanwhile (its trial ended) is skipped."""
     for path in _list_files(settings, "*.log"):
-        found = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
+        row = c.execute(select(live_take.c.id).where(live_take.c.id == path.stem)).first()
         try:
-            yield read_log(path, known=found is not None)
+            yield read_log(path, is_known=row is not None)
         except FileNotFoundError:
             continue
 
 
 def list_originals(settings: Settings) -> list[Path]:
-    """The copies kept of damaged logs."""
+    """Retained copies of damaged logs."""
     return _list_files(settings, "*.damaged")
 
 
@@ -78,9 +79,9 @@ def _list_files(settings: Settings, pattern: str) -> list[Path]:
     return sorted(path for folder in settings.live_folders for path in folder.glob(pattern))
 
 
-def read_log(path: Path, *, known: bool) -> LiveLog:
-    """Look through one log; raises OSError."""
-    found = path.stat()
+def read_log(path: Path, *, is_known: bool) -> LiveLog:
+    """Scan one log; raises OSError."""
+    status = path.stat()
     source, sensors, batches, size, sent = None, 0, 0, 0, []
     for size, one in segments.read_records(path):  # noqa: B007 - the last one is used
         try:
@@ -95,9 +96,9 @@ def read_log(path: Path, *, known: bool) -> LiveLog:
     return LiveLog(
         path.stem,
         path,
-        known,
-        dt.datetime.fromtimestamp(found.st_mtime, dt.UTC),
-        found.st_size,
+        is_known,
+        dt.datetime.fromtimestamp(status.st_mtime, dt.UTC),
+        status.st_size,
         source,
         sensors,
         batches,
@@ -115,7 +116,7 @@ def adopt(
     take_id: str,
     session_id: str,
 ) -> str:
-    """Make a log that the database does not know a recording of a session, analysed; returns its id.
+    """Turn a log unknown to the database into an analysed recording of a session; return its id.
 
     Raises
     ------
@@ -126,7 +127,7 @@ def adopt(
     path = next(iter(_list_files(settings, f"{take_id}.log")), None)
     if path is None:
         raise NotFound("live log", take_id)
-    log = read_log(path, known=False)
+    log = read_log(path, is_known=False)
     if not log.batches:
         raise Conflict("take_empty", f"{path.name} holds no sample that can be read; it was left as it is.")
     with db.write() as c:
@@ -147,8 +148,8 @@ def adopt(
         )
         detail = {"take_id": take_id, "count": log.batches}
         audit.record(c, actor, "live.adopted", "session", session_id, detail)
-    made = live_recordings.keep(db, blobs, queue, path)
-    if made is None:
+    recording_id = live_recordings.keep(db, blobs, queue, path)
+    if recording_id is None:
         raise NotFound("session", session_id)
     fs.remove_file(path)
-    return made
+    return recording_id

@@ -1,6 +1,6 @@
-"""The log of a take that is over becomes a recording of its session, byte for byte, and is analysed.
+"""Conversion of the log of an ended trial to a recording of its session, byte for byte, with analysis.
 
-Every step may be the last before a crash; `repair` takes them again at the start of the server.
+Crash-safe: `repair` repeats interrupted steps when the server starts.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ CHUNK_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class TakeOpener:
-    """The person who opened the take, on whose behalf it is stored and analysed."""
+    """The user who opened the trial, in whose name it is stored and analysed."""
 
     user_id: str
     name: str
 
 
 def log_path(folder: Path, take_id: str) -> Path:
-    """Where the log of a take is while it has not become a recording."""
+    """Path of a trial's log before it becomes a recording."""
     return folder / f"{take_id}.log"
 
 
@@ -50,15 +50,15 @@ def file_name(take: live.LiveTakeRecord) -> str:
 
 
 def keep(db: Database, blobs: BlobStore, queue: JobQueue, path: Path) -> str | None:
-    """Make the log of a take that is over its session's newest recording; done already is fine.
+    """Store the log of an ended trial as its session's latest recording; idempotent.
 
     Parameters
     ----------
-    path : of the log, named by the take.
+    path : of the log, named after the trial.
 
     Returns
     -------
-    The recording's id; None when no sample ever came or the session has been erased. The log may go.
+    The recording's id; None without samples or if the session has been erased. The log may then be deleted.
     """
     take_id = path.stem
     try:
@@ -78,13 +78,13 @@ def keep(db: Database, blobs: BlobStore, queue: JobQueue, path: Path) -> str | N
 
 
 def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) -> list[str]:
-    """Finish what a crash left: store the logs of takes that are over.
+    """Store the logs of ended trials after a crash.
 
-    A log of a take that the database does not know stays: it may be the right database that is missing.
+    Logs of unknown trials are retained, as the correct database may be missing.
 
     Returns
     -------
-    Ids of the takes that are still open and have a log.
+    Ids of open trials with a log.
     """
     fs.make_folder(settings.live)
     _take_in(db, settings)
@@ -108,9 +108,9 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
 
 
 def _take_in(db: Database, settings: Settings) -> None:
-    """Move here the logs and films of web servers that cannot run beside this one, whose takes are ours then.
+    """Take over logs, videos and trials of web servers that cannot run at the same time.
 
-    That is the one without a name, or, where this one has none, all others.
+    These are the unnamed server or, if this one is unnamed, all others.
     """
     left = [one for one in settings.live_folders if one != settings.live and one.is_dir()]
     if settings.node_name:
@@ -127,10 +127,10 @@ def _take_in(db: Database, settings: Settings) -> None:
 
 
 def _note_owner(db: Database, settings: Settings) -> None:
-    """Let the takes whose files are here belong to this server, also where a crash came after the move."""
-    here = {path.name.partition(".")[0] for path in settings.live.iterdir()}
+    """Assign trials whose files are here to this server, also after a crash during the move."""
+    take_ids = {path.name.partition(".")[0] for path in settings.live.iterdir()}
     node = settings.node_name or None
-    strange = live_take.c.id.in_(here) & live_take.c.node.is_distinct_from(node)
+    strange = live_take.c.id.in_(take_ids) & live_take.c.node.is_distinct_from(node)
     with db.read() as c:
         if c.execute(select(live_take.c.id).where(strange).limit(1)).first() is None:
             return
@@ -152,7 +152,7 @@ def _store(
 
 
 def _set_aside(db: Database, take_id: str, path: Path) -> None:
-    """Keep the log of a take without a readable sample when there is more in it than a crash leaves."""
+    """Retain the log of a trial without readable samples if it contains more than a crash leaves."""
     damage = segments.find_damage(path, segments.count_readable_bytes(path))
     if damage is None:
         return
@@ -183,12 +183,12 @@ def _chunks(path: Path) -> Iterator[bytes]:
 
 
 def _hello_of_data(path: Path) -> bytes | None:
-    """The hello of a log with at least one batch, else None."""
+    """The hello of a log with at least one batch, otherwise None."""
     hello = None
-    for _, found in segments.read_records(path):
-        if found.kind == "H":
-            hello = found.body
-        elif found.kind == "B":
+    for _, record in segments.read_records(path):
+        if record.kind == "H":
+            hello = record.body
+        elif record.kind == "B":
             return hello
     return None
 
@@ -200,15 +200,15 @@ def _publish(
     if take.recording_id is not None:
         return take
     blobs.require(take.patient_id, blob.sha256)
-    recording_id, at = new_id(), now()
-    said: dict[str, Any] = {"sensors": _sensors(hello)}
+    recording_id, time = new_id(), now()
+    declared: dict[str, Any] = {"sensors": _sensors(hello)}
     if (limits := live_events.read_test_limits(c, take_id)) is not None:
-        said["test_limits"] = limits
-    manifest = analyses.complete_manifest(c, take.session_id, said)
+        declared["test_limits"] = limits
+    manifest = analyses.complete_manifest(c, take.session_id, declared)
     # alone in its set: files that were uploaded to this session before are another take
     c.execute(
         insert(recording).values(
-            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=at
+            id=recording_id, session_id=take.session_id, manifest=manifest, created_at=time
         )
     )
     c.execute(
@@ -217,7 +217,7 @@ def _publish(
             name=file_name(take),
             size=blob.size,
             sha256=blob.sha256,
-            added_at=at,
+            added_at=time,
         )
     )
     c.execute(update(live_take).where(live_take.c.id == take_id).values(recording_id=recording_id))
@@ -231,13 +231,13 @@ def _publish(
 
 
 def _sensors(hello: bytes) -> dict[str, Any]:
-    """Device → segment, as the tablet declared them."""
+    """Device → segment, as declared by the tablet."""
     from sagittal.core.formats.live_log import parse_hello
 
     return {sensor.id: sensor.segment for stream in parse_hello(hello).streams for sensor in stream.sensors}
 
 
 def find_opener(c: Connection, take: live.LiveTakeRecord) -> TakeOpener | None:
-    """Who opened a take, None when nobody is known who did."""
+    """User who opened a trial, None if unknown."""
     row = c.execute(select(user.c.id, user.c.name).where(user.c.id == take.opened_by)).first()
     return None if row is None else TakeOpener(row.id, row.name)

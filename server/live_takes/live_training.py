@@ -1,6 +1,6 @@
-"""What a live take is estimated and coached with: fixed at its first sample and kept as an event.
+"""Parameters of estimation and feedback of a live trial, fixed at its first sample and stored as an event.
 
-A replay after a crash needs the same target and the same baseline, whatever is prescribed meanwhile.
+A replay after a crash requires the same target and baseline, even if the prescription has changed.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ KIND = "prescription"
 
 @dataclass(frozen=True)
 class LiveTraining:
-    """What the estimator needs to know beside the samples.
+    """Parameters of the estimator in addition to the samples.
 
     Parameters
     ----------
@@ -45,10 +45,10 @@ class LiveTraining:
 
 
 def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> LiveTraining:
-    """What this take began with, or begins with now."""
+    """Stored parameters of a trial, or those for starting it now."""
     query = select(live_event.c.content).where(live_event.c.take_id == take.id, live_event.c.kind == KIND)
     with db.read() as c:
-        said = analyses.complete_manifest(c, take.session_id, None)
+        manifest = analyses.complete_manifest(c, take.session_id, None)
         content = c.execute(query.order_by(live_event.c.seq).limit(1)).scalar()
         begins = content is None
         if content is None:
@@ -58,12 +58,12 @@ def training_of(db: Database, reviewed: ReviewedAnalyses, take: live.LiveTakeRec
             live_events.add_event(c, None, take.id, KIND, None, content)
             row = update(live_take).where(live_take.c.id == take.id)
             c.execute(row.values(prescription_id=content["id"]))
-    height, protocol = said.get("subject", {}).get("height_m"), said["protocol"]
+    height, protocol = manifest.get("subject", {}).get("height_m"), manifest["protocol"]
     return LiveTraining(height, protocol, content["id"], content["prescription"], content["baseline"])
 
 
 def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
-    """Note on the sessions of these takes that somebody walked with feedback."""
+    """Mark the sessions of these trials as walked with feedback."""
     query = (
         select(session.c.id)
         .join(live_take, live_take.c.session_id == session.c.id)
@@ -74,25 +74,25 @@ def note_feedback(c: Connection, take_ids: Collection[str]) -> None:
 
 
 def settle_feedback(c: Connection, actor: audit.Actor | None, take: live.LiveTakeRecord) -> None:
-    """Where an earlier take of the session gave feedback, note whether this one did, which now counts.
+    """Update the feedback mark if an earlier trial of the session had feedback, from the current trial.
 
-    Without such a take what a person said stays; cues that come later are noted by themselves.
+    Otherwise the value set by a user remains; later cues set the mark themselves.
     """
-    given = prescriptions.cues(c, [t.id for t in live.takes_of(c, take.session_id)])
-    told = {of: any(cue.with_feedback for cue in cues) for of, cues in given.items()}
-    if any(told.values()):
-        sessions.change(c, actor, take.session_id, {"feedback": told[take.id]})
+    cues_by_take = prescriptions.cues(c, [t.id for t in live.takes_of(c, take.session_id)])
+    has_feedback = {take_id: any(cue.with_feedback for cue in cues) for take_id, cues in cues_by_take.items()}
+    if any(has_feedback.values()):
+        sessions.change(c, actor, take.session_id, {"feedback": has_feedback[take.id]})
 
 
 def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.LiveTakeRecord) -> dict[str, Any]:
     nothing = {"id": None, "prescription": None, "baseline": None}
     try:
         written = prescriptions.in_force(c, take.patient_id)
-        found = prescriptions.for_take(c, reviewed, take.session_id)
+        prescribed = prescriptions.for_take(c, reviewed, take.session_id)
     except SagittalError:
         # an earlier visit that cannot be read must not keep this one from being recorded
         log.exception("live take %s begins without feedback", take.id)
         return nothing
-    if written is None or found is None or not found[0].target.resolved:
+    if written is None or prescribed is None or not prescribed[0].target.resolved:
         return nothing
-    return {"id": written.id, "prescription": found[0].to_json(), "baseline": found[1].to_json()}
+    return {"id": written.id, "prescription": prescribed[0].to_json(), "baseline": prescribed[1].to_json()}

@@ -1,1 +1,1 @@
-"""Several web servers on one PostgreSQL database: who they are, whose a request is, and the way to them."""
+"""Several web servers on one PostgreSQL database: registry, ownership of requests, and forwarding."""

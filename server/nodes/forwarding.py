@@ -1,7 +1,7 @@
-"""Passes a request or a websocket on to the web server to which it belongs, and its answer back.
+"""Forwards a request or websocket to the web server that owns it, and returns the response.
 
-What is passed on is what came: the receiving server looks at the cookie or token itself, as always. A request
-that was passed on once is answered where it arrives, whatever that server thinks of it.
+Requests are forwarded unchanged: the receiving server checks the cookie or token itself. A request that has
+been forwarded once is answered by the receiving server in any case.
 """
 
 from __future__ import annotations
@@ -42,17 +42,17 @@ _HOPS: Final = frozenset(
 
 
 class UnreachableError(Exception):
-    """The server did not take the connection: nothing has been sent."""
+    """The server did not accept the connection; nothing has been sent."""
 
 
 class Forwarding:
-    """ASGI middleware: the innermost, so that all rules about a request have been kept here already."""
+    """Innermost ASGI middleware, so that all checks on a request have been applied."""
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one connection here, or where it belongs."""
+        """Serve one connection here, or forward it to its owner."""
         pin = None
         if scope["type"] in {"http", "websocket"} and passage.ASKED_BY not in scope:
             pin = find_pin(scope)
@@ -78,10 +78,10 @@ class Forwarding:
 
 
 async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Receive, send: Send) -> None:
-    at = urlsplit(node.address)
+    url = urlsplit(node.address)
     try:
         async with asyncio.timeout(CONNECT_S):
-            reader, writer = await asyncio.open_connection(at.hostname, at.port, ssl=_is_tls(node) or None)
+            reader, writer = await asyncio.open_connection(url.hostname, url.port, ssl=_is_tls(node) or None)
     except (OSError, TimeoutError) as error:
         raise UnreachableError from error
     with contextlib.closing(writer):
@@ -91,10 +91,10 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
         headers = [one for one in scope["headers"] if one[0] not in _HOPS]
         headers.append((passage.HEADER, nodes.write_line(node, scope)))
         headers += [(b"connection", b"close"), (b"content-length", str(len(body)).encode())]
-        asked = h11.Request(method=scope["method"], target=_target(scope), headers=headers)
+        request = h11.Request(method=scope["method"], target=_target(scope), headers=headers)
         try:
             async with asyncio.timeout(ANSWER_S):
-                answer = await _ask(reader, writer, asked, body)
+                answer = await _ask(reader, writer, request, body)
         except (OSError, TimeoutError, h11.ProtocolError):
             problem = Problem(
                 503,
@@ -115,10 +115,10 @@ async def _pass_line(nodes: Nodes, node: WebNode, ws: WebSocket) -> None:
             await carry_messages(ws, up)
     except InvalidStatus as refused:
         answer = refused.response
-        kept = {
+        forwarded = {
             name: value for name, value in answer.headers.raw_items() if name.lower().encode() not in _HOPS
         }
-        denial = Response(answer.body, answer.status_code, kept)
+        denial = Response(answer.body, answer.status_code, forwarded)
         if "websocket.http.response" in ws.scope.get("extensions", {}):
             await ws.send_denial_response(denial)
         else:
@@ -126,12 +126,12 @@ async def _pass_line(nodes: Nodes, node: WebNode, ws: WebSocket) -> None:
 
 
 async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | bytes) -> None:
-    """Carry the line of a tablet, which is open already and has said its first words, to the take's server.
+    """Relay an open tablet connection, including its first message, to the server of the trial.
 
     Raises
     ------
     UnreachableError
-        nothing has been sent; the tablet may come again.
+        nothing has been sent; the tablet may reconnect.
     """
     line = nodes.write_line(node, ws.scope)
     try:
@@ -144,8 +144,8 @@ async def carry_tablet(nodes: Nodes, node: WebNode, ws: WebSocket, first: str | 
 
 @contextlib.asynccontextmanager
 async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[ClientConnection]:
-    """A websocket to another server, asked for as its client did; raises UnreachableError, InvalidStatus."""
-    at = urlsplit(node.address)
+    """Open a websocket to another server on behalf of the client; raises UnreachableError, InvalidStatus."""
+    url = urlsplit(node.address)
     own = {b"host", b"user-agent"}
     headers = [
         (name.decode("latin-1"), value.decode("latin-1"))
@@ -155,13 +155,13 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
     headers.append((passage.HEADER.decode(), line.decode("latin-1")))
     host = ws.headers["host"]
     scheme = "wss" if _is_tls(node) else "ws"
-    options: dict[str, Any] = {"server_hostname": at.hostname} if _is_tls(node) else {}
+    options: dict[str, Any] = {"server_hostname": url.hostname} if _is_tls(node) else {}
     try:
         up = await connect(
             f"{scheme}://{host}{_target(ws.scope).decode('latin-1')}",
             # the name is the one that the client asked for, the place is the other server's
-            host=at.hostname,
-            port=at.port,
+            host=url.hostname,
+            port=url.port,
             additional_headers=headers,
             user_agent_header=ws.headers.get("user-agent"),
             subprotocols=ws.scope.get("subprotocols") or None,
@@ -180,11 +180,11 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
 
 
 async def _ask(
-    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, asked: h11.Request, body: bytes
+    reader: asyncio.StreamReader, writer: asyncio.StreamWriter, request: h11.Request, body: bytes
 ) -> Response:
-    """Send a request and return its whole answer."""
+    """Send a request and return the complete response."""
     line = h11.Connection(h11.CLIENT)
-    for part in (asked, h11.Data(data=body), h11.EndOfMessage()):
+    for part in (request, h11.Data(data=body), h11.EndOfMessage()):
         writer.write(line.send(part) or b"")
     await writer.drain()
     head: h11.Response | None = None
@@ -211,7 +211,7 @@ async def _ask(
 
 
 async def _read_body(receive: Receive) -> bytes | None:
-    """All of a body, whose length has a limit (server/http/body_limit.py); None = the client has gone."""
+    """Read the whole body of limited length (server/http/body_limit.py); None if the client disconnected."""
     body, more = bytearray(), True
     while more:
         message = await receive()

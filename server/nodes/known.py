@@ -1,4 +1,4 @@
-"""Whose word about a client is taken besides a proxy's: that of the other web servers of this clinic."""
+"""Trust in the other web servers of the clinic to forward client addresses."""
 
 from __future__ import annotations
 
@@ -13,35 +13,39 @@ from sagittal.server.nodes.registry import Nodes
 
 
 class KnownNodes:
-    """ASGI middleware: what another web server passes on is its client's; the forged is refused."""
+    """ASGI middleware that applies the client address forwarded by another web server and rejects
+    forgeries.
+    """
 
     def __init__(self, app: ASGIApp) -> None:
         self.app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve or refuse one connection."""
+        """Serve or reject one connection."""
         if scope["type"] in {"http", "websocket"}:
             lines = [value for name, value in scope["headers"] if name == HEADER]
             if lines:
-                told = _read(scope["app"].state.nodes, lines, scope)
-                if told is None:
+                sender = _read(scope["app"].state.nodes, lines, scope)
+                if sender is None:
                     detail = "The request pretends to come from another server. Ask without its header."
                     await send_problem(Problem(403, "not_a_node", detail), scope, receive, send)
                     return
-                asks, client, scheme = told
+                asks, client, scheme = sender
                 headers = [one for one in scope["headers"] if one[0] != HEADER]
                 scope = {**scope, "headers": headers, "client": (client, 0), "scheme": scheme, ASKED_BY: asks}
         await self.app(scope, receive, send)
 
 
 def _read(nodes: Nodes, lines: list[bytes], scope: Scope) -> tuple[str, str, str] | None:
-    """Who asks, and the client's address and scheme; None of a line that no server of ours wrote for this."""
+    """Forwarding server, client address and scheme; None if the header was not signed by one of our
+    servers.
+    """
     line, _, mac = lines[0].decode("latin-1").rpartition(";")
     parts = line.split(";")
     right = sign(nodes.key, line, scope).encode()
     if len(lines) != 1 or len(parts) != 5 or not hmac.compare_digest(right, mac.encode("latin-1")):
         return None
-    asks, asked, at, client, scheme = parts
-    if asked != nodes.name or abs(time.time() - int(at)) > LIFE_S:
+    asks, receiver, timestamp, client, scheme = parts
+    if receiver != nodes.name or abs(time.time() - int(timestamp)) > LIFE_S:
         return None
     return asks, client, scheme

@@ -1,7 +1,7 @@
-"""How one web server tells another for whom it asks, so that nobody else can: a line with an HMAC.
+"""Authentication between web servers: a header with an HMAC identifies the client of a forwarded request.
 
-The key is a file of the data folder that all of them share. The line has who asks, who is asked, when, and
-the client's address and scheme; the HMAC holds it to this one request.
+The key is a file in the shared data folder. The header contains sender, receiver, time, client address and
+scheme; the HMAC binds it to this request.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Headers = Iterable[tuple[bytes, bytes]]
 
 
 def read_key(path: Path) -> bytes:
-    """The key, made by the first server that needs it."""
+    """Read the key; the first server that needs it creates it."""
     fs.make_folder(path.parent)
     with fs.hold_lock(path.with_name("key.lock")):
         with suppress(FileNotFoundError):
@@ -39,17 +39,17 @@ def read_key(path: Path) -> bytes:
     return key
 
 
-def write_line(key: bytes, asks: str, asked: str, scope: Mapping[str, Any]) -> bytes:
-    """The header's value for a request that is passed on as it came."""
+def write_line(key: bytes, asks: str, receiver: str, scope: Mapping[str, Any]) -> bytes:
+    """Header value for a request that is forwarded unchanged."""
     client = scope["client"][0] if scope.get("client") else ""
-    line = f"{asks};{asked};{int(time.time())};{client};{scope['scheme']}"
+    line = f"{asks};{receiver};{int(time.time())};{client};{scope['scheme']}"
     return f"{line};{sign(key, line, scope)}".encode("latin-1")
 
 
 def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
-    """The HMAC of a line and of what it speaks of, as hexadecimal digits."""
+    """HMAC of a header and the request it belongs to, as hexadecimal digits."""
     bound: Headers = sorted(one for one in scope["headers"] if one[0] in _BOUND)
-    asked = (
+    parts = (
         line.encode("latin-1"),
         scope.get("method", "GET").encode(),
         scope.get("raw_path") or scope["path"].encode(),
@@ -57,6 +57,6 @@ def sign(key: bytes, line: str, scope: Mapping[str, Any]) -> str:
         *(part for one in bound for part in one),
     )
     digest = hmac.new(key, digestmod=hashlib.sha256)
-    for part in asked:
+    for part in parts:
         digest.update(len(part).to_bytes(4, "big") + part)
     return digest.hexdigest()

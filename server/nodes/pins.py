@@ -1,4 +1,4 @@
-"""Whose a request is: live takes belong to the web server with their log, 3D views to the one they hash to.
+"""Ownership of requests: live trials belong to the web server with their log, 3D views are assigned by hash.
 
 live take of a session   the server that has the session's newest take while it is open; else that one,
                          while it lives, or the one that the session's id hashes to
@@ -31,7 +31,7 @@ _REPLAY: Final = re.compile(rf"/sessions/{_ID}/replay")
 
 @dataclass(frozen=True)
 class Pin:
-    """What a request is about. kind : session, take or view."""
+    """The resource a request refers to. kind : session, take or view."""
 
     kind: str
     id: str
@@ -39,11 +39,11 @@ class Pin:
 
 @dataclass(frozen=True)
 class Owner:
-    """Another web server to which something belongs.
+    """Another web server that owns a resource.
 
     Parameters
     ----------
-    node : None = it is away. must : nobody else can stand in for it.
+    node : None = unavailable. must : no other server can serve the request.
     """
 
     name: str
@@ -52,14 +52,14 @@ class Owner:
 
 
 def find_pin(scope: Scope) -> Pin | None:
-    """What an address is about that one server must answer; None = any may."""
+    """Resource in a path that one particular server must serve; None = any server."""
     path = scope["path"]
-    if found := _SESSION.fullmatch(path):
-        return Pin("session", found[1] or found[2])
-    if found := _TAKE.fullmatch(path):
-        return Pin("take", found[1])
-    if found := _VIEW.fullmatch(path):
-        return Pin("view", found[1])
+    if match := _SESSION.fullmatch(path):
+        return Pin("session", match[1] or match[2])
+    if match := _TAKE.fullmatch(path):
+        return Pin("take", match[1])
+    if match := _VIEW.fullmatch(path):
+        return Pin("view", match[1])
     if _REPLAY.fullmatch(path):
         names = parse_qs(scope["query_string"].decode("latin-1")).get("view", [""])
         return Pin("view", names[-1]) if re.fullmatch(_ID, names[-1]) else None
@@ -67,7 +67,7 @@ def find_pin(scope: Scope) -> Pin | None:
 
 
 def find_owner(db: Database, nodes: Nodes, pin: Pin) -> Owner | None:
-    """The other server to which it belongs, None = this one answers; blocks."""
+    """The other server that owns a resource, None = this one; blocks."""
     if not nodes.is_one_of_several:
         return None
     if pin.kind == "view":

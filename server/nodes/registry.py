@@ -1,9 +1,9 @@
-"""The web servers of one database, and what belongs to which: every one of them has a name and a heartbeat.
+"""Registry of the web servers of one database; each has a name and a heartbeat.
 
 nodes = Nodes(settings, db, when_fenced); nodes.start(); ...; nodes.stop()
-nodes.find_home(word)        # None = here; the same answer at all of them while the same ones live
+nodes.find_home(word)        # None = here; all servers agree while the same ones are alive
 
-A server without a name serves alone: it has no row, no heartbeat, and everything is its own.
+A server without a name runs alone: it has no row and no heartbeat, and owns everything.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class WebNode:
 
     Parameters
     ----------
-    address : where the others reach it. key_sha256 : of the key that it holds. run : which of its starts.
-    beat_at : None = it was stopped.
+    address : for the other servers. key_sha256 : hash of its key. run : number of its start.
+    beat_at : last heartbeat, None = stopped.
     """
 
     name: str
@@ -53,11 +53,11 @@ class WebNode:
 
 
 class Nodes:
-    """This web server among the others.
+    """This web server and its peers.
 
     Parameters
     ----------
-    when_fenced : called in a thread when another process has taken this one's name: it must end.
+    when_fenced : called in a thread when another process has taken over this one's name, which must then end.
     """
 
     def __init__(self, settings: Settings, db: Database, when_fenced: Callable[[], None]) -> None:
@@ -74,26 +74,26 @@ class Nodes:
         self._thread = threading.Thread(target=self._beat_for_ever, name="node-heartbeat", daemon=True)
 
     def start(self) -> None:
-        """Enter this server and begin its heartbeat; blocks. Raises StrangersError."""
+        """Register this server and start its heartbeat; blocks. Raises StrangersError."""
         if self.name is None:
             return
         self.key = read_key(self._key_file)
-        at = now()
+        time = now()
         with self._db.write() as c:
             mine = web_node.c.name == self.name
-            before = c.execute(select(web_node.c.run).where(mine)).scalar()
+            last_run = c.execute(select(web_node.c.run).where(mine)).scalar()
             claimed = select(func.max(live_take.c.node_run)).where(live_take.c.node == self.name)
-            self.run = max(before or 0, c.execute(claimed).scalar() or 0) + 1
+            self.run = max(last_run or 0, c.execute(claimed).scalar() or 0) + 1
             heard = func.coalesce(web_node.c.beat_at, web_node.c.started_at)
-            c.execute(delete(web_node).where(web_node.c.name != self.name, heard < at - FORGOTTEN))
+            c.execute(delete(web_node).where(web_node.c.name != self.name, heard < time - FORGOTTEN))
             values = {
                 "address": self._address,
                 "key_sha256": hashlib.sha256(self.key).hexdigest(),
                 "run": self.run,
-                "started_at": at,
-                "beat_at": at,
+                "started_at": time,
+                "beat_at": time,
             }
-            if before is None:
+            if last_run is None:
                 c.execute(insert(web_node).values(name=self.name, **values))
             else:
                 c.execute(update(web_node).where(mine).values(**values))
@@ -106,14 +106,14 @@ class Nodes:
         self._thread.start()
 
     def refuse_strangers(self) -> None:
-        """Raise StrangersError where the data folder is not that of the other servers that live; blocks."""
+        """Raise StrangersError if the data folder differs from that of the other live servers; blocks."""
         if self.name is None:
             return
-        mine, at = hashlib.sha256(read_key(self._key_file)).hexdigest(), now()
+        mine, time = hashlib.sha256(read_key(self._key_file)).hexdigest(), now()
         strangers = [
-            other.name
-            for other in self.list_all()
-            if other.name != self.name and other.key_sha256 != mine and self.is_living(other, at)
+            peer.name
+            for peer in self.list_all()
+            if peer.name != self.name and peer.key_sha256 != mine and self.is_living(peer, time)
         ]
         if strangers:
             raise StrangersError(
@@ -122,7 +122,7 @@ class Nodes:
             )
 
     def stop(self) -> None:
-        """Tell the others that this server has stopped; blocks."""
+        """Mark this server as stopped; blocks."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -137,49 +137,49 @@ class Nodes:
         return self.name is not None
 
     def find(self, name: str) -> WebNode | None:
-        """Another server by its name, None when it is not known, is away or cannot be reached."""
-        other = self._others.get(name)
-        return other if other is not None and self.is_living(other, now()) else None
+        """Another server by name, None if unknown or unavailable."""
+        peer = self._others.get(name)
+        return peer if peer is not None and self.is_living(peer, now()) else None
 
     def find_home(self, word: str) -> WebNode | None:
-        """Where something lives that nobody owns, by its id; None = here."""
-        at = now()
-        living = [other for other in self._others.values() if self.is_living(other, at)]
-        home = max((other.name for other in living), key=lambda name: _weigh(name, word), default=None)
+        """Server assigned to an unowned resource by hashing its id; None = here."""
+        time = now()
+        living = [peer for peer in self._others.values() if self.is_living(peer, time)]
+        home = max((peer.name for peer in living), key=lambda name: _weigh(name, word), default=None)
         if home is None or self.name is None or _weigh(self.name, word) > _weigh(home, word):
             return None
         return self._others[home]
 
     def make_id_here(self, make: Callable[[], str]) -> str:
-        """An id whose home is this server."""
+        """A new id that is assigned to this server."""
         while True:
-            found = make()
-            if self.find_home(found) is None:
-                return found
+            candidate = make()
+            if self.find_home(candidate) is None:
+                return candidate
 
-    def write_line(self, other: WebNode, scope: Mapping[str, Any]) -> bytes:
-        """What tells another server for whom this one asks (server/nodes/passage.py)."""
-        return write_line(self.key, self.name or "", other.name, scope)
+    def write_line(self, peer: WebNode, scope: Mapping[str, Any]) -> bytes:
+        """Header that authenticates a forwarded request (server/nodes/passage.py)."""
+        return write_line(self.key, self.name or "", peer.name, scope)
 
-    def suspect(self, other: WebNode) -> None:
-        """Take a server that cannot be reached for away until it is heard of again."""
-        self._suspected[other.name] = other.beat_at
+    def suspect(self, peer: WebNode) -> None:
+        """Treat an unreachable server as unavailable until its next heartbeat."""
+        self._suspected[peer.name] = peer.beat_at
 
-    def is_living(self, node: WebNode, at: dt.datetime) -> bool:
-        """Whether a server beats and is reached."""
-        if node.beat_at is None or (at - node.beat_at).total_seconds() > self._lease_s:
+    def is_living(self, node: WebNode, time: dt.datetime) -> bool:
+        """Whether a server has a recent heartbeat and is reachable."""
+        if node.beat_at is None or (time - node.beat_at).total_seconds() > self._lease_s:
             return False
         suspected_at = self._suspected.get(node.name)
         return suspected_at is None or node.beat_at > suspected_at
 
     def explain_silence(self) -> str:
-        """ "ok", or that the others take this server for away."""
+        """ "ok", or a message that the other servers consider this one unavailable."""
         if time.monotonic() - self._beaten_at <= self._lease_s:
             return "ok"
         return "Its heartbeat is not written: the other web servers take it for away. See the server's log."
 
     def list_all(self) -> list[WebNode]:
-        """Every server that was ever here, by name; blocks."""
+        """All servers ever registered, by name; blocks."""
         with self._db.read() as c:
             rows = c.execute(select(web_node).order_by(web_node.c.name))
             return [WebNode(**row._asdict()) for row in rows]
@@ -187,10 +187,10 @@ class Nodes:
     def _look(self) -> None:
         self._others = {node.name: node for node in self.list_all() if node.name != self.name}
 
-    def _write_beat(self, at: dt.datetime | None) -> bool:
+    def _write_beat(self, time: dt.datetime | None) -> bool:
         with self._db.write() as c:
             mine = (web_node.c.name == self.name, web_node.c.run == self.run)
-            return bool(c.execute(update(web_node).where(*mine).values(beat_at=at)).rowcount)
+            return bool(c.execute(update(web_node).where(*mine).values(beat_at=time)).rowcount)
 
     def _beat_for_ever(self) -> None:
         while not self._stop.wait(self._lease_s / 3):

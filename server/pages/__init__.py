@@ -1,1 +1,3 @@
-"""Server-made HTML over the same services as the API: one file a page; changes go through the API itself."""
+"""Server-rendered HTML using the same services as the API, one module per page; changes go through the
+API.
+"""

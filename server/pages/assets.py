@@ -1,4 +1,4 @@
-"""What pages load beside their HTML: style sheets, scripts and icons."""
+"""Static files of pages: style sheets, scripts and icons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ STATIC = Path(web.__file__).parent / "static"
 
 
 class Assets(StaticFiles):
-    """Style sheets, scripts and icons; browsers keep them and ask whether they are still the same."""
+    """Style sheets, scripts and icons; browsers cache and revalidate them."""
 
     action = Action.LOAD_ASSET
 
@@ -27,7 +27,7 @@ class Assets(StaticFiles):
         scope: Scope,
         status_code: int = 200,
     ) -> Response:
-        """Let caches keep the file but ask each time: names carry no version."""
+        """Require caches to revalidate, as file names carry no version."""
         response = super().file_response(full_path, stat_result, scope, status_code)
         response.headers["Cache-Control"] = "no-cache"
         return response

@@ -1,4 +1,4 @@
-"""Who opened or changed what."""
+"""Page of the audit log."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ AUDIT_ROWS = 100
 def show_audit_log(
     request: Request,
     db: Db,
-    who: Annotated[Identity, require(Action.READ_AUDIT)],
+    user: Annotated[Identity, require(Action.READ_AUDIT)],
     before: Annotated[int | None, Query(ge=1, le=2**53)] = None,
 ) -> Response:
-    """Who opened or changed what, the newest first."""
+    """Access and changes by users, newest first."""
     with db.read() as c:
-        rows = audit.list_entries(c, before=before, limit=AUDIT_ROWS)
-        said = describe_rows(c, rows)
+        rows = audit.list_entries(c, before_seq=before, limit=AUDIT_ROWS)
+        sentences = describe_rows(c, rows)
     older = rows[-1].seq if len(rows) == AUDIT_ROWS else None
-    return render_page(request, db, who, "audit.html", "audit", rows=said, older=older)
+    return render_page(request, db, user, "audit.html", "audit", rows=sentences, older=older)

@@ -1,4 +1,4 @@
-"""Rows of the audit trail as sentences: who did what with whom."""
+"""Rows of the audit trail as sentences."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, Row, select
 
+from sagittal.core.user_text import UserText
 from sagittal.server.storage.schema.care_tables import emergency_access
 from sagittal.server.storage.schema.tables import patient, session
-from sagittal.web.user_text import UserText
 from sagittal.web.words import day
 
 DEEDS: Final[Mapping[str, str]] = {
@@ -172,13 +172,13 @@ BY_STRANGERS: Final = ("sign_in.failed", "report_link.opened", "report_link.refu
 
 @dataclass(frozen=True)
 class AuditSentence:
-    """A row of the trail in words.
+    """A row of the audit trail in words.
 
     Parameters
     ----------
-    who, deed : "anna", "opened the visit". whom : code of the patient, None where it is about nobody or the
-        patient is deleted. of : the visit's day. href : where it is now, None where it is no more. why : the
-        reason that was given, None = none, or the patient is deleted.
+    who, deed : "anna", "opened the visit". whom : code of the patient, None without one or if deleted.
+    of : date of the visit. href : link to the resource, None if deleted. why : stated reason, None = none, or
+        the patient is deleted.
     row : the row itself.
     """
 
@@ -192,33 +192,41 @@ class AuditSentence:
 
 
 def describe_rows(c: Connection, rows: Sequence[Row[Any]]) -> list[AuditSentence]:
-    """Say rows in words, with the patients and visits they are about as far as these still exist."""
+    """Describe rows in words, with patients and visits as far as they still exist."""
     ids = {row.resource_id for row in rows if row.resource in {"patient", "session"}}
     people = c.execute(select(patient.c.id, patient.c.code).where(patient.c.id.in_(ids)))
     codes = {row.id: row.code for row in people}
     query = select(session.c.id, session.c.performed_on, patient.c.code).join(patient)
     visits = {r.id: r for r in c.execute(query.where(session.c.id.in_(ids)))}
     accesses = [row.detail.get("access") for row in rows if row.action == "emergency.opened"]
-    given = select(emergency_access.c.id, emergency_access.c.reason).where(
+    reasons_query = select(emergency_access.c.id, emergency_access.c.reason).where(
         emergency_access.c.id.in_(accesses)
     )
-    reasons = {r.id: r.reason for r in c.execute(given)} if accesses else {}
-    found = []
+    reasons = {r.id: r.reason for r in c.execute(reasons_query)} if accesses else {}
+    sentences = []
     for row in rows:
-        why = reasons.get(row.detail.get("access"))
+        stated_reason = reasons.get(row.detail.get("access"))
         visit = visits.get(row.resource_id)
         code = codes.get(row.resource_id)
-        whom, of, href = code, None, None if code is None else f"/patients/{row.resource_id}"
+        patient_code, date, href = code, None, None if code is None else f"/patients/{row.resource_id}"
         if visit is not None:
-            whom, of, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
-        found.append(
-            AuditSentence(_name(row), describe_deed(row.action, row.detail), whom, of, href, why, row)
+            patient_code, date, href = visit.code, day(visit.performed_on), f"/sessions/{visit.id}"
+        sentences.append(
+            AuditSentence(
+                _name(row),
+                describe_deed(row.action, row.detail),
+                patient_code,
+                date,
+                href,
+                stated_reason,
+                row,
+            )
         )
-    return found
+    return sentences
 
 
 def describe_deed(action: str, detail: Mapping[str, Any] | None = None) -> str:
-    """What an action is in words, with the factor of a sign-in; of one without words its own name."""
+    """Description of an action, with the factor of a sign-in; an unknown action's own name."""
     if action == "sign_in" and detail and detail.get("factor") in SIGNED_IN_BY:
         return SIGNED_IN_BY[detail["factor"]]
     return DEEDS.get(action, action.replace("_", " ").replace(".", ": "))

@@ -1,4 +1,4 @@
-"""What every page has around it: navigation, running jobs, who may do what; and the audit row of opening."""
+"""Page frame: navigation, running jobs and permissions; and audit of access."""
 
 from __future__ import annotations
 
@@ -28,22 +28,23 @@ FRAGMENT = "x-sagittal-fragment"
 """Header by which a page's own script asks for a part of it."""
 
 
-def record_opening(request: Request, who: Identity, resource: str, resource_id: str) -> None:
-    """Write down that somebody looked at it."""
-    state_of(request).trail.record_opened(who, f"{resource}.opened", resource, resource_id)
+def record_opening(request: Request, user: Identity, resource: str, resource_id: str) -> None:
+    """Record access to a resource in the audit log."""
+    state_of(request).trail.record_opened(user, f"{resource}.opened", resource, resource_id)
 
 
-def record_listing(request: Request, who: Identity, resource: str) -> None:
-    """Write down that somebody looks at the list of all."""
-    state_of(request).trail.record_watched(who, f"{resource}.listed", resource, None)
+def record_listing(request: Request, user: Identity, resource: str) -> None:
+    """Record access to a list in the audit log."""
+    state_of(request).trail.record_watched(user, f"{resource}.listed", resource, None)
 
 
 def render_page(
     request: Request,
     db: Database,
-    who: Identity,
+    user: Identity,
     template: str,
-    here: str,
+    section: str,
+    /,
     running: int | None = None,
     **context: object,
 ) -> Response:
@@ -51,18 +52,18 @@ def render_page(
 
     Parameters
     ----------
-    here : its entry in the navigation. running : `jobs.count_active`, where it is read already.
+    section : its entry in the navigation. running : `jobs.count_active`, if already known.
     """
     if running is None:
-        running = jobs.count_active(db, who)
-    return render_sheets(request, who, template, nav=NAVIGATION, here=here, running=running, **context)
+        running = jobs.count_active(db, user)
+    return render_sheets(request, user, template, nav=NAVIGATION, here=section, running=running, **context)
 
 
-def render_sheets(request: Request, who: Identity, template: str, **context: object) -> Response:
-    """Render sheets of paper: a page without navigation."""
+def render_sheets(request: Request, user: Identity, template: str, /, **context: object) -> Response:
+    """Render printed pages without navigation."""
     shell = {
-        "signed_in": who.name,
+        "signed_in": user.name,
         "version": CODE_VERSION,
-        "may": lambda action: who.may(Action(action)),
+        "may": lambda action: user.may(Action(action)),
     }
     return render(request, template, shell | context)

@@ -1,4 +1,4 @@
-"""How the installation is: its parts, its backups, the end of the audit log."""
+"""State of the installation: components, backups, end of the audit log."""
 
 from __future__ import annotations
 
@@ -39,54 +39,54 @@ PART_WORDS: Final = {
 
 @router.get("/system")
 def show_system(
-    request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.READ_SYSTEM)]
+    request: Request, db: Db, settings: Config, user: Annotated[Identity, require(Action.READ_SYSTEM)]
 ) -> Response:
-    """How the parts are, how backups and restore tests went, how far the audit log has come."""
+    """State of components, backups and restore tests, and latest row of the audit log."""
     checks = state_of(request).readiness.checks()
     with db.read() as c:
         head = read_newest(c)
         overdue = _list_overdue(c, settings.retention_years)
-    parts = [(PART_WORDS[name], None if said == "ok" else said) for name, said in checks.items()]
+    parts = [(PART_WORDS[name], None if message == "ok" else message) for name, message in checks.items()]
     state = backup_schedule.read_state(settings)
     nodes = state_of(request).nodes
     upcoming = backup_schedule.next_time(settings, dt.datetime.now().astimezone())
     return render_page(
-        request, db, who, "system.html", "system",
+        request, db, user, "system.html", "system",
         parts=parts, head=head, folder=settings.backup_dir, encrypted=bool(settings.backup_key),
         backups=describe_backups(state, now()), upcoming=upcoming,
         nodes=_describe_nodes(nodes, now()), years=settings.retention_years, overdue=overdue,
     )  # fmt: skip
 
 
-def _describe_nodes(nodes: Nodes, at: dt.datetime) -> list[tuple[WebNode, bool]]:
-    """Every web server and whether it is there; none where one serves alone."""
+def _describe_nodes(nodes: Nodes, time: dt.datetime) -> list[tuple[WebNode, bool]]:
+    """All web servers and their availability; empty for a single server."""
     if not nodes.is_one_of_several:
         return []
-    return [(node, nodes.is_living(node, at)) for node in nodes.list_all()]
+    return [(node, nodes.is_living(node, time)) for node in nodes.list_all()]
 
 
 def _list_overdue(c: Connection, years: int) -> list[Patient]:
-    """Patients without a visit for so many years; 0 = nobody is asked for."""
+    """Patients without a visit for this many years; 0 = none."""
     if not years:
         return []
     return patients.list_older(c, move_years(now().date(), -years))
 
 
-def describe_backups(state: BackupState, at: dt.datetime) -> list[dict[str, Any]]:
-    """Rows of the table: last backup and last restore test, each with its state."""
+def describe_backups(state: BackupState, time: dt.datetime) -> list[dict[str, Any]]:
+    """Table rows for the last backup and restore test, with their state."""
     return [
-        _describe("Last backup", state.backup, at, backup_schedule.LATE),
-        _describe("Last restore test", state.test, at, backup_schedule.TEST_EVERY + backup_schedule.LATE),
+        _describe("Last backup", state.backup, time, backup_schedule.LATE),
+        _describe("Last restore test", state.test, time, backup_schedule.TEST_EVERY + backup_schedule.LATE),
     ]
 
 
-def _describe(what: str, found: Outcome | None, at: dt.datetime, late: dt.timedelta) -> dict[str, Any]:
-    if found is None:
-        return {"what": what, "kind": "warn", "word": "none yet", "found": None}
-    if found.ok is None:
+def _describe(title: str, outcome: Outcome | None, time: dt.datetime, late: dt.timedelta) -> dict[str, Any]:
+    if outcome is None:
+        return {"what": title, "kind": "warn", "word": "none yet", "found": None}
+    if outcome.ok is None:
         kind, word = "warn", "not tested"
-    elif not found.ok:
+    elif not outcome.ok:
         kind, word = "bad", "failed"
     else:
-        kind, word = ("warn", "late") if at - found.at > late else ("ok", "good")
-    return {"what": what, "kind": kind, "word": word, "found": found}
+        kind, word = ("warn", "late") if time - outcome.at > late else ("ok", "good")
+    return {"what": title, "kind": kind, "word": word, "found": outcome}

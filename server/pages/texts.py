@@ -1,4 +1,4 @@
-"""The texts that scripts say in another language than that of their sources."""
+"""Translated texts for scripts."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ router = APIRouter(include_in_schema=False)
 def load_texts(
     language: Annotated[str, Path(max_length=8)], version: Annotated[str, Path(max_length=64)]
 ) -> Response:
-    """Answer with the catalogue of one language; the address of an earlier version gets the present one."""
+    """The catalogue of one language; URLs of earlier versions return the current one."""
     if language not in LANGUAGES or language == SOURCE:
         raise Problem(404, "not_found", SENTENCES["not_found"])
     present, content = script_texts(language)
-    kept = KEPT if version == present else "no-cache"
-    return Response(content, media_type="application/json", headers={"Cache-Control": kept})
+    cache_control = KEPT if version == present else "no-cache"
+    return Response(content, media_type="application/json", headers={"Cache-Control": cache_control})

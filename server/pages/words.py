@@ -1,4 +1,4 @@
-"""What pages call protocols, segments, roles and states."""
+"""Display names of protocols, segments, roles and states."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ SEGMENT_NAMES: Final = {
 
 
 def describe_person(sex: str | None, birth_year: int | None) -> str:
-    """Sex and age as in "M, 58 y"."""
+    """Sex and age, for example "M, 58 y"."""
     parts = [sex[0].upper()] if sex else []
     if birth_year:
         parts.append(f"{dt.datetime.now(dt.UTC).year - birth_year} y")

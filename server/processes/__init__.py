@@ -1,1 +1,1 @@
-"""Starting our own processes, talking to them and ending them."""
+"""Child processes: start, communication and termination."""

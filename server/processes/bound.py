@@ -1,8 +1,8 @@
-"""Run a module so that it ends with its starter from its first import on.
+"""Run a module that ends with its parent process, even while it is still importing.
 
     python -m sagittal.server.processes.bound MODULE …
 
-Importing a module takes seconds, during which it cannot watch for the end of its starter itself.
+Imports take seconds, during which the module cannot monitor its parent itself.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Messages between two of our processes: a socket pair, each message with its length before it.
+"""Length-prefixed messages between two of our processes over a socket pair.
 
-The bytes of a message are the business of who sends it (MessagePack everywhere; not pickle: a child reads
-files from outside, and who got hold of it must not get hold of its parent too).
+The encoding of messages is up to the caller (MessagePack throughout; not pickle, since a child reads
+untrusted files and a compromised child must not compromise its parent).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ _PIECE_BYTES = 1 << 20
 
 
 def frame(message: bytes) -> bytes:
-    """Return what goes over the line for one message."""
+    """Return the bytes sent for one message."""
     return _LENGTH.pack(len(message)) + message
 
 
 async def read_message(reader: asyncio.StreamReader) -> bytes:
-    """Return the next message on the event loop; raises IncompleteReadError when the other side has gone."""
+    """Return the next message on the event loop; raises IncompleteReadError if the peer has closed."""
     (length,) = _LENGTH.unpack(await reader.readexactly(_LENGTH.size))
     return await reader.readexactly(length)
 
 
 class Channel:
-    """One end of the line, for a thread that may wait.
+    """One end of the connection, for blocking use in a thread.
 
-    It reads no further than the message it returns, so that `poll` on `fileno` tells whether one is there.
+    Never reads past the message it returns, so `poll` on `fileno` indicates whether another is available.
 
     Parameters
     ----------
@@ -45,23 +45,23 @@ class Channel:
         return self._socket.fileno()
 
     def send(self, message: bytes) -> None:
-        """Send a message; waits while the other side does not read; raises OSError when it has gone."""
+        """Send a message; blocks while the peer does not read; raises OSError if it has closed."""
         self._socket.sendall(_LENGTH.pack(len(message)))
         self._socket.sendall(message)
 
     def has_message(self, timeout_s: float) -> bool:
-        """Wait for a message, at most so long; also true when the other side has gone."""
+        """Wait for a message up to a timeout; also true if the peer has closed."""
         waiting = select.poll()
         waiting.register(self._socket, select.POLLIN)
         return bool(waiting.poll(ceil(1000.0 * timeout_s)))
 
     def receive(self) -> bytes:
-        """Return the next message, however long it takes; raises EOFError when the other side has gone."""
+        """Block until the next message and return it; raises EOFError if the peer has closed."""
         (length,) = _LENGTH.unpack(self._read(_LENGTH.size))
         return self._read(length)
 
     def close(self) -> None:
-        """Let go of the line; the other side reads its end."""
+        """Close the connection; the peer reads end of file."""
         self._socket.close()
 
     def _read(self, size: int) -> bytes:

@@ -1,10 +1,9 @@
-"""A process of ours with a line to it: how it is started, and how it begins.
+"""Child processes with a channel: starting one, and entry point in the child.
 
     process, line = start_child("sagittal.server.worker.child", settings)       # in the parent
-    line, settings = enter_child()                                      # in the child, first of all
+    line, settings = enter_child()                                      # in the child, first statement
 
-The child ends with its parent (lifeline.py), leaves Ctrl-C to it and keeps to the memory that the settings
-allow.
+The child ends with its parent (lifeline.py), ignores Ctrl-C and is limited to the memory of the settings.
 """
 
 from __future__ import annotations
@@ -33,13 +32,13 @@ FAR_BEHIND: Final = 2 * BEHIND
 
 
 def start_child(
-    module: str, settings: Settings, behind: int = 0
+    module: str, settings: Settings, niceness: int = 0
 ) -> tuple[subprocess.Popen[bytes], socket.socket]:
-    """Run a module that begins with `enter_child`; return the process and our end of the line to it.
+    """Run a module that begins with `enter_child`; return the process and our end of the channel.
 
     Parameters
     ----------
-    behind : by how much it is nicer than this process, from its first import on.
+    niceness : increment of the nice value relative to this process, applied at start.
     """
     ours, theirs = socket.socketpair()
     with theirs:
@@ -49,34 +48,34 @@ def start_child(
             stdin=subprocess.PIPE,
             pass_fds=[theirs.fileno()],
         )
-    _put_behind(process.pid, behind)
+    _put_behind(process.pid, niceness)
     return process, ours
 
 
-def start_module(module: str, settings: Settings, behind: int = 0) -> subprocess.Popen[bytes]:
-    """Run a module of ours without a line; it ends with this process (lifeline.py).
+def start_module(module: str, settings: Settings, niceness: int = 0) -> subprocess.Popen[bytes]:
+    """Run one of our modules without a channel; it ends with this process (lifeline.py).
 
-    A module that has to tidy up first calls `call_when_parent_ends`.
+    A module that needs to clean up first calls `call_when_parent_ends`.
 
     Parameters
     ----------
-    behind : by how much it is nicer than this process, from its first import on.
+    niceness : increment of the nice value relative to this process, applied at start.
     """
     process = subprocess.Popen(  # noqa: S603 - our own interpreter and module
         [sys.executable, "-m", BOUND, module], env=make_environment(settings), stdin=subprocess.PIPE
     )
-    _put_behind(process.pid, behind)
+    _put_behind(process.pid, niceness)
     return process
 
 
-def _put_behind(pid: int, behind: int) -> None:
-    """Make a process nicer than this one, if it has not ended already."""
+def _put_behind(pid: int, niceness: int) -> None:
+    """Increase a process's nice value relative to this one, if it is still running."""
     with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + behind)
+        os.setpriority(os.PRIO_PROCESS, pid, os.getpriority(os.PRIO_PROCESS, 0) + niceness)
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:
-    """Kill a process, wait until it is gone and let go of its standard input."""
+    """Kill a process, wait for it and close its standard input."""
     process.kill()
     process.wait()
     if process.stdin:
@@ -84,7 +83,7 @@ def end_process(process: subprocess.Popen[bytes]) -> None:
 
 
 def enter_child() -> tuple[Channel, Settings]:
-    """Take up the line that `start_child` gave this process, bind its life to the parent's, limit its memory.
+    """Open the channel given by `start_child`, tie this process's lifetime to the parent's and limit memory.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""All filters compiled by two processes at a time, once for a user and version of them."""
+"""Compiles all filters in two parallel processes, once per user and version."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ what live takes ask for first comes first."""
 
 
 def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
-    """Fill the folder of compiled filters that `sagittal.server.storage.compile_cache` names.
+    """Fill the folder of compiled filters given by `sagittal.server.storage.compile_cache`.
 
     Raises
     ------
@@ -85,9 +85,9 @@ def _write_script(order: Order) -> str:
 
 
 def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
-    """The same where the folder holds none; processes that ask meanwhile wait for the one that compiles.
+    """Compile the filters if the folder is empty; concurrent callers wait for the one that compiles.
 
-    What fails here is compiled where it is first called, and fails there.
+    Filters that fail here are compiled at their first call, where the error is raised.
     """
     folder = Path(os.environ[VARIABLE])
     with suppress(OSError, subprocess.CalledProcessError):
@@ -103,7 +103,7 @@ def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
 
 
 def is_compiling() -> bool:
-    """Whether another process fills the folder of compiled filters now, so that a start waits for it."""
+    """Whether another process is currently filling the folder, so that startup waits for it."""
     try:
         lock = os.open(Path(os.environ[VARIABLE]), os.O_RDONLY)
     except OSError:

@@ -1,4 +1,4 @@
-"""What every process of ours inherits from the one that starts it."""
+"""Environment inherited by child processes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A process of ours that is started for one answer and ends with it: what it computes stops nobody else."""
+"""One-shot child processes that compute a single result without blocking the server."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MOST_WAITING: Final = 3
 
 
 class TooManyErrands(Exception):  # noqa: N818 - says what is refused
-    """As many as may wait do so already."""
+    """The waiting queue is full."""
 
 
 class ErrandTurn:
-    """One errand of a kind at a time; a few wait for it, more are refused at once."""
+    """Runs one errand of a kind at a time; a few wait, further ones are rejected immediately."""
 
     def __init__(self) -> None:
         self._turn = threading.Semaphore(1)
@@ -38,19 +38,19 @@ class ErrandTurn:
             self._places.release()
 
 
-def run_errand(module: str, settings: Settings, order: bytes, longest_s: float, behind: int = 0) -> bytes:
-    """Start a module that begins with `enter_child`, give it an order and return what it answers.
+def run_errand(module: str, settings: Settings, order: bytes, longest_s: float, niceness: int = 0) -> bytes:
+    """Start a module that begins with `enter_child`, send it a request and return the response.
 
     Parameters
     ----------
-    behind : by how much the process is nicer than this one.
+    niceness : increment of the nice value relative to this process.
 
     Raises
     ------
     TimeoutError
-        there was no answer within `longest_s`. EOFError, OSError: the process ended without one.
+        no response within `longest_s`. EOFError, OSError: the process ended without one.
     """
-    process, end = start_child(module, settings, behind)
+    process, end = start_child(module, settings, niceness)
     line = Channel(end)
     try:
         line.send(order)

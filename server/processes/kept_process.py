@@ -1,4 +1,4 @@
-"""A process on the event loop that is always there: replaced when it dies or says nothing any more."""
+"""Permanent child process on the event loop, restarted when it dies or hangs."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ GRACE_S: Final = 1.0
 
 
 class KeptProcess:
-    """One child process, one after another.
+    """Child process that is restarted when it ends.
 
     Parameters
     ----------
-    module : what it runs; the module begins with `enter_child`.
-    greet : called when a process has been started: the messages it gets first.
+    module : module to run; begins with `enter_child`.
+    greet : called when a process has started; returns the first messages for it.
     hear : called with every message of the process.
-    mourn : called when a process has ended unasked, before the next is started.
+    mourn : called when a process has ended unexpectedly, before the next is started.
 
     Attributes
     ----------
-    is_warm : set by who hears that the process is ready to work; false again when it ends.
+    is_warm : set by the receiver of messages when the process is ready; reset when it ends.
     """
 
     is_warm = False
@@ -62,7 +62,7 @@ class KeptProcess:
 
     @property
     def pid(self) -> int | None:
-        """Process id, None while there is none that lives."""
+        """Process id, None while no process is running."""
         process = self._process
         return process.pid if process is not None and process.poll() is None else None
 
@@ -73,7 +73,7 @@ class KeptProcess:
 
     @property
     def backlog_bytes(self) -> int:
-        """How much waits for the process to read it."""
+        """Number of bytes not yet read by the process."""
         return 0 if self._writer is None else self._writer.transport.get_write_buffer_size()
 
     def start(self) -> None:
@@ -81,22 +81,22 @@ class KeptProcess:
         self._task = asyncio.create_task(self._keep())
 
     async def stop(self) -> None:
-        """End the process and start no other."""
+        """End the process without restarting it."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
 
     def send(self, message: bytes) -> None:
-        """Send a message, soon; to a process that is not there it is lost."""
+        """Queue a message; it is dropped if there is no process."""
         if self._writer is not None and not self._writer.is_closing():
             self._writer.write(frame(message))
 
     def expect_answer(self) -> None:
-        """From now on the process owes a message; any one will do."""
+        """Expect a message from the process within HUNG_S; any message satisfies it."""
         self._owes = self._owes or time.monotonic()
 
     def end_if_hung(self) -> None:
-        """Kill a warm process that has owed a message for HUNG_S; another takes its place."""
+        """Kill a warm process whose expected message is overdue by HUNG_S; it is then restarted."""
         hung = (
             self.is_warm
             and self._owes is not None
@@ -108,7 +108,7 @@ class KeptProcess:
             self._process.kill()
 
     async def _keep(self) -> None:
-        """Keep one process alive until cancelled."""
+        """Restart the process until cancelled."""
         while True:
             began = time.monotonic()
             try:
@@ -121,7 +121,7 @@ class KeptProcess:
             await asyncio.sleep(RESTART_S[min(self._deaths, len(RESTART_S)) - 1])
 
     async def _live(self) -> None:
-        """Start a process, greet it, listen until it is gone."""
+        """Start a process, send the first messages and receive until it ends."""
         self._process, line = start_child(self._module, self._settings)
         reader, self._writer = await asyncio.open_connection(sock=line)
         self._heard, self._owes = time.monotonic(), None
@@ -134,7 +134,7 @@ class KeptProcess:
                 self._hear(message)
 
     async def _end(self) -> None:
-        """Let go of the process, whatever state it is in."""
+        """Release all resources of the process, in any state."""
         self.is_warm = False
         writer, self._writer = self._writer, None
         if writer is not None:

@@ -1,7 +1,7 @@
-"""No process outlives the one that started it.
+"""Ends child processes together with their parent.
 
-The starter holds the other end of our standard input and never writes to it. When it is gone, whatever way,
-we read the end of the file. On Linux the kernel also kills us, in the middle of a computation too.
+The parent holds the other end of our standard input and never writes to it, so end of file means that it is
+gone, for any reason. On Linux the kernel also kills us, even in the middle of a computation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _actions: list[Callable[[], None]] = []
 
 
 def call_when_parent_ends(action: Callable[[], None]) -> None:
-    """Call `action` in a thread when the starter has gone; it replaces what was to be called before."""
+    """Call `action` in a thread when the parent has ended; replaces an earlier action."""
     is_first = not _actions
     _actions[:] = [action]
     if is_first:
@@ -35,7 +35,7 @@ def _await_end() -> None:
 
 
 def die_with(parent_pid: int) -> None:
-    """Be killed by the kernel when the thread that started us ends (Linux; elsewhere nothing happens)."""
+    """Ask the kernel to kill this process when the thread that started it ends (Linux only)."""
     if sys.platform != "linux":
         return
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)

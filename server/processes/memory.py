@@ -1,4 +1,4 @@
-"""One allocator for all libraries."""
+"""Shared memory allocator of all libraries."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import os
 
 
 def share_allocator() -> None:
-    """Let Arrow take its memory where NumPy does; call it before Arrow is imported.
+    """Make Arrow use the system allocator like NumPy; call before Arrow is imported.
 
-    Its own allocator keeps 15 MB that it has let go of.
+    Arrow's own allocator retains 15 MB of freed memory.
     """
     os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")

@@ -1,4 +1,4 @@
-"""The worker processes of `sagittal serve`: started, replaced when they die, ended with the server.
+"""Supervisor of the worker processes of `sagittal serve`: starts, restarts and stops them.
 
 workers = Workers(settings); workers.start(); ...; workers.stop()
 """
@@ -25,7 +25,7 @@ GRACE_S = 5.0
 
 
 class Workers:
-    """As many worker processes as settings.workers says."""
+    """Worker processes, `settings.workers` in number."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -34,12 +34,12 @@ class Workers:
         self._thread = threading.Thread(target=self._watch, name="workers", daemon=True)
 
     def start(self) -> None:
-        """Start all; returns at once, they get warm by themselves."""
+        """Start all workers without waiting until they are warm."""
         self._processes = [self._spawn() for _ in range(self._settings.workers)]
         self._thread.start()
 
     def stop(self) -> None:
-        """Let each give its job back, and wait until all are gone."""
+        """Let each worker return its job to the queue, and wait until all have ended."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
@@ -53,12 +53,12 @@ class Workers:
 
     @property
     def pids(self) -> list[int]:
-        """Process ids of the workers that live."""
+        """Process ids of the running workers."""
         return [p.pid for p in self._processes if p.poll() is None]
 
     @property
     def healthy(self) -> bool:
-        """Whether every worker lives."""
+        """Whether all workers are running."""
         return len(self.pids) == self._settings.workers
 
     def _spawn(self) -> subprocess.Popen[bytes]:

@@ -1,1 +1,1 @@
-"""Analysis → what a person reads: degrees, words, curves, exports."""
+"""Presentation of an analysis: degrees, words, curves and export files."""

@@ -1,7 +1,7 @@
-"""A document that stands alone as PDF, by WeasyPrint (BSD-3-Clause; needs the system's Pango).
+"""PDF rendering of a self-contained document by WeasyPrint (BSD-3-Clause; needs the system's Pango).
 
-Nothing is fetched: styles are in the document, pictures in `data:` addresses; any other address is refused.
-Imported by a process of its own only (server/sharing/paper_child.py): the library takes a second and 130 MB.
+Nothing is downloaded: styles are inline, images are `data:` URLs; other URLs are refused. Imported only in a
+separate process (server/sharing/paper_child.py), as the library takes a second and 130 MB.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MISSING: Final = (
 
 
 class PdfMissing(SagittalError):  # noqa: N818 - says what is missing
-    """The library that makes PDFs is not installed."""
+    """The library for PDFs is not installed."""
 
     status = 404
 
@@ -63,7 +63,9 @@ def render_pdf(html: str) -> bytes:
 
 
 def _trim_ends(page: Element) -> None:
-    """Take the space off the end of each block: a line that fits but for it breaks after its first word."""
+    """Remove white space at the end of blocks: otherwise a line that just fits breaks after its first
+    word.
+    """
     for block in page.iter():
         if block.tag in BLOCKS:
             if len(block):
@@ -73,7 +75,7 @@ def _trim_ends(page: Element) -> None:
 
 
 def _move_foot(page: Element) -> None:
-    """The foot of the first sheet goes to the start, from where each page takes it; the others go."""
+    """Move the first page's footer to the start, from where every page takes it; remove the others."""
     parents = {child: parent for parent in page.iter() for child in parent}
     feet = [e for e in page.iter("footer") if "r-foot" in e.get("class", "").split()]
     for foot in feet:

@@ -1,6 +1,6 @@
-"""Tables over many takes: one of all strides, one of all takes, those that failed with their sentence.
+"""Tables over many trials: strides, trials, and failures with their messages.
 
-`sagittal study` makes them of a folder, the service of the visits that somebody chose.
+Used by `sagittal study` for a folder and by the service for selected visits.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _LIBRARIES: Final = ("numpy", "scipy", "numba", "pyarrow")
 
 @dataclass(frozen=True, eq=False)
 class StudyTake:
-    """A take of a study.
+    """A trial of a study.
 
     Parameters
     ----------
-    name : unique in the study. labels : what else is known of it, in every row of its strides too.
-    files : how many were recorded. sha256 : of each by name.
-    error : why there is no result, None where there is one.
+    name : unique in the study. labels : further attributes, also added to every row of its strides.
+    files : their number. sha256 : of each by name.
+    error : why there is no result, None if there is one.
     read_analysis : its analysis.json. read_strides : its strides.csv, None without strides.
     """
 
@@ -47,7 +47,7 @@ class StudyTake:
 
 @dataclass(frozen=True, eq=False)
 class StudyTables:
-    """Files by name, the number of strides in them, and of takes that failed."""
+    """Files by name, the number of strides, and the number of failed trials."""
 
     files: Mapping[str, bytes]
     strides: int
@@ -55,11 +55,11 @@ class StudyTables:
 
 
 def write_study(takes: Sequence[StudyTake], about: Mapping[str, object]) -> StudyTables:
-    """Write strides and takes as CSV and Parquet, failures as CSV, and where all of it comes from as JSON.
+    """Write strides and trials as CSV and Parquet, failures as CSV, and provenance as JSON.
 
     Parameters
     ----------
-    about : what provenance.json says beside versions and takes.
+    about : content of provenance.json in addition to versions and trials.
     """
     strides = [row for take in takes for row in _list_strides(take)]
     failed = [
@@ -99,23 +99,27 @@ def _list_strides(take: StudyTake) -> Iterator[dict[str, object]]:
 
 
 def _summarise(take: StudyTake) -> dict[str, object]:
-    """One row of the table of takes: what it is, how it went, the mean of every parameter."""
+    """One row of the table of trials: labels, quality, and the mean of every parameter."""
     code = None if take.error is None else take.error.code
     row: dict[str, object] = {"take": take.name, **take.labels, "files": take.files, "error": code}
     if code is not None:
         return row
-    found = take.read_analysis()
-    estimator = (found["estimator"] or {}).get("name")
-    row |= {"quality": found["quality"]["level"], "estimator": estimator, "warnings": len(found["warnings"])}
-    row["estimated_angles"] = " ".join(_list_estimated(found)) or None
-    for p in found["parameters"]:
+    analysis = take.read_analysis()
+    estimator = (analysis["estimator"] or {}).get("name")
+    row |= {
+        "quality": analysis["quality"]["level"],
+        "estimator": estimator,
+        "warnings": len(analysis["warnings"]),
+    }
+    row["estimated_angles"] = " ".join(_list_estimated(analysis)) or None
+    for p in analysis["parameters"]:
         row["_".join(part for part in (p["name"], p["side"]) if part)] = p["mean"]
     return row
 
 
-def _list_estimated(found: Mapping[str, Any]) -> list[str]:
-    """Angles with their side that a model of the leg gives, and no two sensors measure."""
-    return sorted(list_estimated_angles(found["estimator"]))
+def _list_estimated(analysis: Mapping[str, Any]) -> list[str]:
+    """Angles with their side that are estimated by a leg model rather than measured by two sensors."""
+    return sorted(list_estimated_angles(analysis["estimator"]))
 
 
 def _value(cell: str) -> object:
@@ -128,7 +132,7 @@ def _value(cell: str) -> object:
 
 
 def _write_table(stem: str, rows: Sequence[Mapping[str, object]]) -> dict[str, bytes]:
-    """The same table as CSV and as Parquet; a column that some rows lack is null there."""
+    """A table as CSV and Parquet; columns missing in some rows are null there."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

@@ -1,4 +1,4 @@
-"""CSV twins of what the pages show: parameters, cycle curves, trends, strides with feedback."""
+"""CSV equivalents of the pages: parameters, cycle curves, trends, strides with feedback."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SYMMETRY = {
 
 
 def parameters_csv(report: ReportModel) -> bytes:
-    """One row per parameter and side, numbers in full, norm where comparable, reason where no number."""
+    """One row per parameter and side: unrounded value or reason for its absence, and comparable norm."""
     header = (
         "name",
         "side",
@@ -61,7 +61,10 @@ def parameters_csv(report: ReportModel) -> bytes:
                         *numbers,
                         r.unit,
                         r.difference,
-                        *(None if r.symmetry is None else getattr(r.symmetry, what) for what in SYMMETRY),
+                        *(
+                            None if r.symmetry is None else getattr(r.symmetry, index_name)
+                            for index_name in SYMMETRY
+                        ),
                         *norm,
                         *usual,
                         (r.reason or r.side_reason) if c is None else None,
@@ -71,8 +74,8 @@ def parameters_csv(report: ReportModel) -> bytes:
     return write_csv(header, rows())
 
 
-def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes:
-    """One row per figure, side and visit, with its change against the first assessment and the limits."""
+def trends_csv(visits: Sequence[AnalysedVisit], trends: Sequence[Trend]) -> bytes:
+    """One row per parameter, side and visit, with the change since the first assessment and its limits."""
     header = (
         *("name", "side", "unit", "date", "session_id", "visit", "kind"),
         *("n", "mean", "sd", "ci_low", "ci_high", "estimated"),
@@ -80,7 +83,7 @@ def trends_csv(visits: Sequence[AnalysedVisit], found: Sequence[Trend]) -> bytes
     )
 
     def rows() -> Iterator[Sequence[object]]:
-        for trend in found:
+        for trend in trends:
             for line in trend.lines:
                 for p in line.points:
                     v, c = visits[p.visit], p.change
@@ -100,9 +103,9 @@ def _judged(c: Change) -> tuple[object, ...]:
 
 
 def curves_csv(report: ReportModel) -> bytes:
-    """One row per variable, side and % of cycle: mean and sd over the counted strides, norm of that zero.
+    """One row per variable, side and % of cycle: mean and sd of the included strides, matching norm.
 
-    Where the leg model's knee rests on its limit in most strides the mean is empty and `reason` says so.
+    The mean is empty, with a `reason`, where the knee of the leg model is at its limit in most strides.
     """
     header = (
         "variable",
@@ -147,7 +150,7 @@ def curves_csv(report: ReportModel) -> bytes:
 
 
 def feedback_csv(view: FeedbackView | None) -> bytes:
-    """One row per stride of a live take with its cue, numbers in full; without feedback only the header."""
+    """One row per stride of a live trial with its cue, unrounded; without feedback only the header."""
     header = (
         *("n", "side", "start_s", "parameter", "value", "live_value", "unit", "kind", "shown", "why_not"),
         *("in_zone", "level", "zone_low", "zone_high", "probe_block"),

@@ -1,1 +1,1 @@
-"""Analyses, edits of them, and what is compared, prescribed and read from them."""
+"""Analyses, edits, comparisons, prescriptions and other results."""

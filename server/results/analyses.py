@@ -1,4 +1,4 @@
-"""Analyses: ask for one, publish and read the results (what computes them: server/results/analysing.py)."""
+"""Analyses: request, publish and read results (for the computation see server/results/analysing.py)."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from sagittal.server.uploads import recordings
 
 @dataclass(frozen=True)
 class AnalysisRecord:
-    """A finished analysis: what went in, by what, and which files came out (name → stored bytes)."""
+    """A finished analysis: inputs, code version, and result files (name → stored bytes)."""
 
     id: str
     recording_id: str
@@ -60,10 +60,10 @@ def submit(
     *,
     config: Mapping[str, Any] | None = None,
 ) -> JobView:
-    """Ask for an analysis of the current recording with its manifest as last set.
+    """Request an analysis of the current recording with its latest manifest.
 
-    Height and protocol of the session (or the patient) fill in what the manifest leaves open. The same files,
-    mapping, parameters and version are analysed once; after a failure or another mapping, again.
+    Height and protocol are taken from the session (or the patient) if not in the manifest. Identical files,
+    mapping, parameters and version are analysed only once, unless the analysis failed or the mapping changed.
 
     Raises
     ------
@@ -89,11 +89,11 @@ def submit(
 
 
 def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha256: str) -> None:
-    """Write the rows of a result, in the transaction that marks its job done.
+    """Store the rows of a result, in the transaction that marks its job done.
 
     Parameters
     ----------
-    config_sha256 : digest of all parameters that were used, defaults included, from the result itself.
+    config_sha256 : digest of all parameters used, including defaults, from the result itself.
     """
     params = claim.params
     analysis_id = new_id()
@@ -116,20 +116,20 @@ def publish(c: Connection, claim: Claim, stored: Mapping[str, Blob], config_sha2
 
 def get(c: Connection, analysis_id: str) -> AnalysisRecord:
     """One analysis; raises NotFound."""
-    found = _analyses(c, c.execute(_QUERY.where(analysis.c.id == analysis_id)))
-    if not found:
+    records = _analyses(c, c.execute(_QUERY.where(analysis.c.id == analysis_id)))
+    if not records:
         raise NotFound("analysis", analysis_id)
-    return found[0]
+    return records[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[AnalysisRecord]:
-    """All analyses of a session, the one that counts first: last asked for, else newest."""
+    """All analyses of a session, the current one first: the last requested, otherwise the newest."""
     query = _QUERY.where(session.c.id == session_id).order_by(*_COUNTS_FIRST)
     return _analyses(c, c.execute(query))
 
 
 def latest(c: Connection, session_id: str) -> AnalysisRecord | None:
-    """The analysis a session's pages show, None before the first result."""
+    """The displayed analysis of a session, None before the first result."""
     return latest_of(c, [session_id]).get(session_id)
 
 
@@ -138,17 +138,17 @@ def latest_of(
     session_ids: Collection[str] | Select[tuple[str]],
     values: Mapping[str, object] = MappingProxyType({}),
 ) -> dict[str, AnalysisRecord]:
-    """`latest` of many sessions, by session, in two statements; a session without a result is left out.
+    """`latest` for many sessions, in two statements; sessions without a result are omitted.
 
     Parameters
     ----------
-    session_ids : ids, or the statement of a module that selects them. values : its parameters.
+    session_ids : ids, or a statement that selects them. values : its parameters.
     """
     if isinstance(session_ids, Select):
         result = c.execute(_select_latest(session_ids), dict(values))
     else:
         result = c.execute(_select_latest(_IDS), {"session_ids": list(session_ids)})
-    return {found.session_id: found for found in _analyses(c, result)}
+    return {record.session_id: record for record in _analyses(c, result)}
 
 
 @cache
@@ -159,19 +159,19 @@ def _select_latest(session_ids: Select[tuple[str]]) -> Select[Any]:
 
 
 def get_shown(c: Connection, session_id: str) -> AnalysisRecord:
-    """The same; raises NotFound when there is no session or no result."""
+    """The displayed analysis of a session; raises NotFound if there is no session or result."""
     sessions.get(c, session_id)
-    found = latest(c, session_id)
-    if found is None:
+    record = latest(c, session_id)
+    if record is None:
         raise NotFound("analysis of session", session_id)
-    return found
+    return record
 
 
-def file_bytes(blobs: BlobStore, found: AnalysisRecord, name: str) -> bytes:
-    """A result file, verified; raises NotFound, IntegrityError."""
-    if name not in found.files:
+def file_bytes(blobs: BlobStore, record: AnalysisRecord, name: str) -> bytes:
+    """Read and verify a result file; raises NotFound, IntegrityError."""
+    if name not in record.files:
         raise NotFound("file", name)
-    return blobs.read(found.patient_id, found.files[name].sha256)
+    return blobs.read(record.patient_id, record.files[name].sha256)
 
 
 def _joined(query: Select[Any]) -> Select[Any]:
@@ -200,34 +200,34 @@ _FILES = (
 
 
 def _analyses(c: Connection, result: Result[Any]) -> list[AnalysisRecord]:
-    """Analyses with their files, all read in one statement."""
+    """Analyses with their files, read in one statement."""
     files: defaultdict[str, dict[str, Blob]] = defaultdict(dict)
-    made = make_all(lambda **row: AnalysisRecord(**row, files=files[row["id"]]), result)
-    for of, name, sha256, size in c.execute(_FILES, {"analysis_ids": list(files)}) if files else ():
-        files[of][name] = Blob(sha256, size)
-    return made
+    records = make_all(lambda **row: AnalysisRecord(**row, files=files[row["id"]]), result)
+    for analysis_id, name, sha256, size in c.execute(_FILES, {"analysis_ids": list(files)}) if files else ():
+        files[analysis_id][name] = Blob(sha256, size)
+    return records
 
 
 def complete_manifest(c: Connection, session_id: str, manifest: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A manifest with height and protocol of the session (or the patient) where it leaves them open."""
-    said = dict(manifest or {})
+    """Complete a manifest with height and protocol of the session (or the patient)."""
+    completed = dict(manifest or {})
     row = c.execute(
         select(session.c.protocol, session.c.height_m, patient.c.height_m.label("usual_height_m"))
         .join(patient, patient.c.id == session.c.patient_id)
         .where(session.c.id == session_id)
     ).one()
     height = row.height_m if row.height_m is not None else row.usual_height_m
-    subject = dict(said.get("subject") or {})
+    subject = dict(completed.get("subject") or {})
     if subject.get("height_m") is None and height is not None:
         subject["height_m"] = height
     if subject:
-        said["subject"] = subject
-    if said.get("protocol") is None:
-        said["protocol"] = row.protocol
-    return said
+        completed["subject"] = subject
+    if completed.get("protocol") is None:
+        completed["protocol"] = row.protocol
+    return completed
 
 
 def digest_json(value: object) -> str:
-    """sha256 of a value as JSON, whatever the order of its members."""
+    """SHA-256 of a value as JSON, independent of key order."""
     text = json.dumps(value, sort_keys=True, ensure_ascii=False, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Files of a take in, result files out: what command line and worker run, without a database."""
+"""Analysis of the files of a trial to result files, as run by command line and worker without a database."""
 
 from __future__ import annotations
 
@@ -27,20 +27,22 @@ def run(
     config: Mapping[str, Any] | None,
     progress: Progress,
 ) -> dict[str, bytes]:
-    """Files of one take in, result files out (server/report/files/exports.py); as `analyse_files`."""
+    """Analyse the files of one trial to result files (server/report/files/exports.py); like
+    `analyse_files`.
+    """
     from sagittal.core.formats.json_tree import read_json
     from sagittal.server.report.files.exports import analysis_files
 
     results = [analyse_files(files, manifest, config, progress, resumable=False)]
     setup = results[0].setup
     # by no name here: what is written is let go of
-    found = analysis_files(results.pop(), give_memory_back)
+    result_files = analysis_files(results.pop(), give_memory_back)
     if setup is not None and setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
         assert isinstance(declared, dict)  # noqa: S101 - `parse_manifest` has read it
         repaired = setup.complete_manifest(declared)
-        found[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
-    return found
+        result_files[REPAIRED] = json.dumps(repaired, ensure_ascii=False, indent=1).encode()
+    return result_files
 
 
 def analyse_files(
@@ -51,19 +53,19 @@ def analyse_files(
     *,
     resumable: bool = True,
 ) -> TakeAnalysis:
-    """Files of one take through the whole chain; pure but for `progress`.
+    """Run the complete pipeline on the files of one trial; pure except for `progress`.
 
     Parameters
     ----------
     manifest : JSON text, None = nothing declared.
-    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; without any those of an archive
-        of a visit among the files, else the defaults.
-    resumable : as `sagittal.core.pipeline.analyse`.
+    config : overrides of PipelineConfig by stage, {"fusion": {"k_acc": 1.0}}; if empty, those of an archive
+        of a visit among the files, otherwise the defaults.
+    resumable : see `sagittal.core.pipeline.analyse`.
 
     Raises
     ------
     SagittalError
-        nothing can be analysed; the code and the sentence say why.
+        nothing can be analysed; code and message give the reason.
     """
     from sagittal.core.formats import read_recording
     from sagittal.core.formats.manifest import parse_manifest
@@ -85,7 +87,9 @@ def analyse_files(
 def analyse_again(
     files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt, share: float
 ) -> TakeAnalysis:
-    """Analyse a take as the analysis that a job is about did; the stages are one, `share` of the job."""
+    """Repeat the analysis of a trial that a job is based on, as one stage with `share` of the job's
+    progress.
+    """
     return analyse_files(
         files,
         dump_manifest(params),
@@ -95,23 +99,23 @@ def analyse_again(
 
 
 def dump_manifest(params: Mapping[str, Any]) -> bytes:
-    """The manifest of a job, as JSON text."""
+    """Manifest of a job, as JSON text."""
     return json.dumps(params["manifest"], ensure_ascii=False).encode()
 
 
 @cache
 def _keep_libraries() -> None:
-    """What libraries hold is never garbage: looking through it takes each analysis 70 ms."""
+    """Exclude library objects from garbage collection, which would cost 70 ms per analysis."""
     gc.freeze()
 
 
 def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None) -> Mapping[str, Any]:
-    """The settings that were asked for, else those that came with an archive of a visit; none without one.
+    """The requested settings, otherwise those from an archive of a visit, or none.
 
     Raises
     ------
     ArchiveError
-        the archive is damaged, or its settings are no JSON.
+        the archive is damaged, or its settings are not valid JSON.
     """
     from sagittal.core.errors import ArchiveError
     from sagittal.core.formats.archive import read_episode_config
@@ -119,21 +123,21 @@ def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None)
 
     if config:
         return config
-    said = read_episode_config(files)
+    archived = read_episode_config(files)
     try:
-        found = {} if said is None else read_json(said)
+        settings = {} if archived is None else read_json(archived)
     except ValueError as error:
         raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
-    return found if isinstance(found, dict) else {}
+    return settings if isinstance(settings, dict) else {}
 
 
 def inspect(files: Sequence[SourceFile], manifest: Mapping[str, Any] | None, progress: Progress) -> bytes:
-    """What is in the files, as JSON, before any mapping; only `sources` of the manifest is heeded.
+    """Describe the content of files as JSON, before any mapping; uses only `sources` of the manifest.
 
     Raises
     ------
     SagittalError
-        the files cannot be read; the code and the sentence say why.
+        the files cannot be read; code and message give the reason.
     """
     from sagittal.core import quality
     from sagittal.core.formats import read_recording

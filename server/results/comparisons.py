@@ -1,4 +1,4 @@
-"""Which two sessions of a patient are compared: any two with a result, or one and the one before it."""
+"""Selection of two sessions of a patient for comparison: any two with results, or one and its predecessor."""
 
 from __future__ import annotations
 
@@ -32,37 +32,39 @@ class SessionPair:
 
     @property
     def comparable(self) -> bool:
-        """Whether a difference can be called a change of the person."""
+        """Whether a difference can be attributed to the patient."""
         return is_comparable(self.before.condition, self.after.condition)
 
     @property
     def cautions(self) -> tuple[str, ...]:
-        """Why a difference may come from how was walked or measured, in sentences."""
-        said = []
+        """Differences in walking condition or measurement that may explain a change, as sentences."""
+        reasons = []
         old, new = self.before, self.after
         if unlike := compare_conditions(old.condition, new.condition):
-            said.append(
+            reasons.append(
                 f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
                 "difference is called a change."
             )
         elif old.session.feedback:
-            said.append("Both were walked with feedback, so no difference is called a change.")
+            reasons.append("Both were walked with feedback, so no difference is called a change.")
         elif unstated := new.condition.unstated:
-            said.append(f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike.")
+            reasons.append(
+                f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike."
+            )
         if _sensors(old) != _sensors(new):
-            said.append("Other segments carried sensors in the two sessions.")
+            reasons.append("Other segments carried sensors in the two sessions.")
         if old.found.config_sha256 != new.found.config_sha256:
-            said.append("The two analyses have different settings; run the earlier one again to compare.")
+            reasons.append("The two analyses have different settings; run the earlier one again to compare.")
         elif old.found.code_version != new.found.code_version:
-            said.append(
+            reasons.append(
                 f"The analyses are of different versions ({old.found.code_version}, "
                 f"{new.found.code_version}); run the earlier one again to compare."
             )
-        return tuple(said)
+        return tuple(reasons)
 
 
 def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
-    """Two sessions to compare, in whatever order they are named.
+    """Two sessions to compare, given in any order.
 
     Raises
     ------
@@ -70,21 +72,22 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
     """
     if session_id == other_id:
         raise Conflict("same_session", "A session is compared with another one, not with itself.")
-    both = [_analysed(c, sid) for sid in (session_id, other_id)]
-    if both[0].session.patient_id != both[1].session.patient_id:
+    ends = [_analysed(c, sid) for sid in (session_id, other_id)]
+    if ends[0].session.patient_id != ends[1].session.patient_id:
         raise Conflict("other_patient", "These sessions belong to different patients.")
-    both.sort(key=lambda a: _moment(a.session))
-    return SessionPair(patients.get(c, both[0].session.patient_id), *both)
+    ends.sort(key=lambda a: _moment(a.session))
+    return SessionPair(patients.get(c, ends[0].session.patient_id), *ends)
 
 
 def list_comparable(
     c: Connection, session: Session, done: Sequence[AnalysedSession]
 ) -> list[tuple[AnalysedSession, VisitKind]]:
-    """The analysed sessions of earlier days that a session is compared with, oldest first, then itself.
+    """Earlier analysed sessions comparable with a session, oldest first, followed by the session.
 
-    All were walked under its condition. Of an assessment they are the assessments, so that a training does
-    not stand for the course. Takes of one day walked alike are one visit, not a change of each other. A
-    session with feedback stands alone, and none before has feedback. Empty where it has no result itself.
+    All have the same walking condition. An assessment is compared with assessments only, so that a training
+    does not influence the trend. Trials of one day under the same condition form one visit and are not
+    compared with each other. Sessions with feedback are neither compared nor used for comparison. Empty if
+    the session has no result.
 
     Parameters
     ----------
@@ -104,7 +107,7 @@ def list_comparable(
 
 
 def find_previous(c: Connection, session: Session, done: Sequence[AnalysedSession]) -> AnalysedSession | None:
-    """The last session before this one in `list_comparable`: what its table is compared with; None = none."""
+    """The session that a session's table is compared with, from `list_comparable`; None = none."""
     return pick_previous(list_comparable(c, session, done))
 
 
@@ -117,23 +120,27 @@ def _moment(session: Session) -> tuple[dt.date, dt.datetime]:
     return session.performed_on, session.created_at
 
 
-def compare_sessions(reviewed: ReviewedAnalyses, found: SessionPair) -> tuple[ComparedRow, ...]:
-    """The table of a comparison; raises IntegrityError."""
-    old = reviewed.read_numbers(found.before.found, found.before.edits)
-    new = reviewed.read_numbers(found.after.found, found.after.edits)
-    known = pair_norms(found.patient, (found.before.session, old), (found.after.session, new))
-    return compare_rows(old, new, known, found.patient.affected_side, comparable=found.comparable)
+def compare_sessions(reviewed: ReviewedAnalyses, session_pair: SessionPair) -> tuple[ComparedRow, ...]:
+    """Table of a comparison; raises IntegrityError."""
+    old = reviewed.read_numbers(session_pair.before.found, session_pair.before.edits)
+    new = reviewed.read_numbers(session_pair.after.found, session_pair.after.edits)
+    norm_pair = pair_norms(
+        session_pair.patient, (session_pair.before.session, old), (session_pair.after.session, new)
+    )
+    return compare_rows(
+        old, new, norm_pair, session_pair.patient.affected_side, comparable=session_pair.comparable
+    )
 
 
 def pair_norms(
-    patient: Patient, before: tuple[Session, Numbers], after: tuple[Session, Numbers]
+    patient: Patient, earlier: tuple[Session, Numbers], later: tuple[Session, Numbers]
 ) -> tuple[Norms, Norms]:
-    """The references of a person at two sessions, each at its own speed."""
-    return find_norms(patient, *before), find_norms(patient, *after)
+    """Norms for a patient at two sessions, each at its own gait speed."""
+    return find_norms(patient, *earlier), find_norms(patient, *later)
 
 
 def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
-    """The reference of a person on the day of a session, at its speed."""
+    """Norms for a patient at a session's date and gait speed."""
     speed = next((p.mean for p in numbers.parameters if p.name == "gait_speed_mps"), None)
     age = patient.find_age(session.performed_on)
     height = patient.find_height(session)
@@ -149,8 +156,8 @@ def find_norms(patient: Patient, session: Session, numbers: Numbers) -> Norms:
 
 def _analysed(c: Connection, session_id: str) -> AnalysedSession:
     session = sessions.get(c, session_id)
-    found = analyses.get_shown(c, session_id)
-    return AnalysedSession(session, found, edit_log.edits_of(c, found.id))
+    record = analyses.get_shown(c, session_id)
+    return AnalysedSession(session, record, edit_log.edits_of(c, record.id))
 
 
 def _sensors(a: AnalysedSession) -> frozenset[str]:

@@ -1,4 +1,4 @@
-"""The clinic's own controls: healthy people who agreed that their visits serve as reference."""
+"""The clinic's own controls: healthy subjects who consented to serve as a reference."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ NEAR_MPS: Final = 0.2
 
 @dataclass(frozen=True)
 class ControlVisit:
-    """An analysed visit of a control."""
+    """An analysed visit of a control subject."""
 
     person: str
     sex: str | None
@@ -36,17 +36,17 @@ class ControlVisit:
 
 
 def list_visits(c: Connection, this: Patient, session: Session) -> tuple[ControlVisit, ...]:
-    """Unaided visits of controls with the protocol of a session; nobody is a control of themselves.
+    """Unaided visits of controls with the protocol of a session, excluding the patient's own.
 
-    The pace is theirs: of these visits those count that are as fast as the person (`make_group`).
+    Visits are not selected by pace here: `make_group` selects those with a similar gait speed.
     """
     values = {"this_id": this.id, "this_protocol": session.protocol}
-    shown = analyses.latest_of(c, _THEIRS, values)
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    records = analyses.latest_of(c, _THEIRS, values)
+    edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
     return tuple(
-        ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, found, edits[found.id])
+        ControlVisit(row.code, row.sex, row.birth_year, row.performed_on, record, edits[record.id])
         for row in c.execute(_PEOPLE, values)
-        if (found := shown.get(row.id)) is not None
+        if (record := records.get(row.id)) is not None
         and WalkingCondition(aid=row.aid, orthosis=row.orthosis, feedback=row.feedback).is_unaided
     )
 
@@ -72,13 +72,13 @@ _PEOPLE: Final = (
 
 
 def make_group(
-    reviewed: ReviewedAnalyses, known: Sequence[ControlVisit], speed_mps: float | None
+    reviewed: ReviewedAnalyses, visits: Sequence[ControlVisit], speed_mps: float | None
 ) -> ControlGroup | None:
-    """The controls who walk as fast as a person; None without any control or without a speed."""
-    if not known or speed_mps is None:
+    """Controls with a gait speed similar to the patient's; None without any control or without a speed."""
+    if not visits or speed_mps is None:
         return None
     near = (round(speed_mps - NEAR_MPS, 2), round(speed_mps + NEAR_MPS, 2))
-    return control_group([_session(reviewed, v) for v in known], speed_mps=near)
+    return control_group([_session(reviewed, v) for v in visits], speed_mps=near)
 
 
 def _session(reviewed: ReviewedAnalyses, visit: ControlVisit) -> ControlSession:

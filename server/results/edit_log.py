@@ -1,7 +1,6 @@
-"""The edits of an analysis: rows that are only added to; undoing one adds a row too.
+"""Edits of an analysis: append-only rows, including those for undoing.
 
-Making the edit again that was undone last is a redo: what was undone before it can still be redone. Any other
-edit ends that.
+Repeating the edit that was undone last is a redo and preserves the redo history; any other edit clears it.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ UNDO: Final = "undo"
 
 @dataclass(frozen=True)
 class MadeEdit:
-    """A live edit: who made it, and when."""
+    """An edit in effect, with author and time."""
 
     seq: int
     edit: Edit
@@ -33,12 +32,12 @@ class MadeEdit:
 
 @dataclass(frozen=True)
 class EditHistory:
-    """The edits of an analysis that count, oldest first.
+    """The edits in effect of an analysis, oldest first.
 
     Parameters
     ----------
-    version : number of the last row, undone ones included; 0 = nothing was ever changed.
-    changed_at : of that row, None = nothing was ever changed.
+    version : number of the last row, including undone ones; 0 = never edited.
+    changed_at : time of that row, None = never edited.
     undone : edits that can be redone, the next one last.
     """
 
@@ -49,21 +48,21 @@ class EditHistory:
 
     @property
     def edits(self) -> tuple[Edit, ...]:
-        """What was changed."""
+        """The edits without author and time."""
         return tuple(m.edit for m in self.made)
 
     def changed_after(self, moment: dt.datetime) -> bool:
-        """Whether something was changed, or taken back, after a moment."""
+        """Whether an edit was made or undone after a given time."""
         return self.changed_at is not None and self.changed_at > moment
 
     @property
     def key(self) -> tuple[int, ...]:
-        """Equal keys are equal edits: undoing one leads back to the key before."""
+        """Equal keys denote equal edits: undoing an edit restores the previous key."""
         return tuple(m.seq for m in self.made)
 
 
 def edits_of(c: Connection, analysis_id: str) -> EditHistory:
-    """The live edits of an analysis."""
+    """The edits in effect of an analysis."""
     return edits_of_all(c, [analysis_id])[analysis_id]
 
 
@@ -76,14 +75,14 @@ _OF_ALL: Final = (
 
 
 def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, EditHistory]:
-    """The live edits of many analyses by analysis, in one statement."""
-    made: dict[str, list[MadeEdit]] = {found: [] for found in analysis_ids}
-    undone: dict[str, list[Edit]] = {found: [] for found in made}
-    version = dict.fromkeys(made, 0)
+    """The edits in effect of many analyses, by analysis, in one statement."""
+    by_analysis: dict[str, list[MadeEdit]] = {analysis_key: [] for analysis_key in analysis_ids}
+    undone: dict[str, list[Edit]] = {analysis_key: [] for analysis_key in by_analysis}
+    version = dict.fromkeys(by_analysis, 0)
     changed_at: dict[str, dt.datetime] = {}
-    for row in c.execute(_OF_ALL, {"analysis_ids": list(made)}) if made else ():
+    for row in c.execute(_OF_ALL, {"analysis_ids": list(by_analysis)}) if by_analysis else ():
         version[row.analysis_id], changed_at[row.analysis_id] = row.seq, row.at
-        live, stack = made[row.analysis_id], undone[row.analysis_id]
+        live, stack = by_analysis[row.analysis_id], undone[row.analysis_id]
         if row.kind == UNDO:
             stack.append(live.pop().edit)
             continue
@@ -94,6 +93,8 @@ def edits_of_all(c: Connection, analysis_ids: Collection[str]) -> dict[str, Edit
             stack.clear()
         live.append(MadeEdit(row.seq, edit, row.display_name, row.at))
     return {
-        found: EditHistory(version[found], tuple(live), changed_at.get(found), tuple(undone[found]))
-        for found, live in made.items()
+        analysis_key: EditHistory(
+            version[analysis_key], tuple(live), changed_at.get(analysis_key), tuple(undone[analysis_key])
+        )
+        for analysis_key, live in by_analysis.items()
     }

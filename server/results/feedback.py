@@ -1,4 +1,4 @@
-"""What came of the feedback in a session's live take: its cues put to the strides of the analysis."""
+"""Outcome of feedback in a session's live trial: cues matched to the strides of the analysis."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ REASONS: Final = {
 
 @dataclass(frozen=True, eq=False)
 class TrainedSession:
-    """A session with feedback: its analysis, what was trained in it, and the cues of the analysed take."""
+    """A session with feedback: its analysis, training, and cues of the analysed trial."""
 
     at: AnalysedSession
     training: TrainedTake
@@ -44,11 +44,11 @@ class TrainedSession:
 
 @dataclass(frozen=True, eq=False)
 class FeedbackRecords:
-    """What the database knows of the feedback in a session.
+    """Database records of feedback in a session.
 
     Parameters
     ----------
-    this : None with a `reason`. before : the visit before with the same training, walked alike.
+    this : None with a `reason`. before : the previous visit with the same training and condition.
     """
 
     patient: Patient
@@ -60,36 +60,36 @@ class FeedbackRecords:
 def gather(
     c: Connection, patient: Patient, session_id: str, done: Sequence[AnalysedSession]
 ) -> FeedbackRecords:
-    """Read all that `view` needs of a session of this patient.
+    """Read everything `view` requires for a session of this patient.
 
     Parameters
     ----------
     done : the analysed sessions of the patient (histories.analysed).
     """
-    at = {a.session.id: a for a in done}
-    given = prescriptions.trainings(c, patient.id)
-    here = [t for t in given if t.session_id == session_id]
-    if not here:
+    by_session = {a.session.id: a for a in done}
+    history = prescriptions.trainings(c, patient.id)
+    of_this_session = [t for t in history if t.session_id == session_id]
+    if not of_this_session:
         return FeedbackRecords(patient, None, reason="no_feedback")
-    this = _analysed_take(at.get(session_id), here)
+    this = _analysed_take(by_session.get(session_id), of_this_session)
     if isinstance(this, str):
         return FeedbackRecords(patient, None, reason=this)
     earlier = (
         t
-        for t in reversed(given[: given.index(here[0])])
+        for t in reversed(history[: history.index(of_this_session[0])])
         if prescriptions.same_training(t.content, this.content)
-        and _analysed_take(at.get(t.session_id), [t]) is t
-        and is_alike(at[t.session_id].condition, at[session_id].condition)
+        and _analysed_take(by_session.get(t.session_id), [t]) is t
+        and is_alike(by_session[t.session_id].condition, by_session[session_id].condition)
     )
-    both = [this, *itertools.islice(earlier, 1)]
-    cues = prescriptions.cues(c, [t.take_id for t in both])
-    trained = [TrainedSession(at[t.session_id], t, tuple(cues[t.take_id])) for t in both]
+    sessions_compared = [this, *itertools.islice(earlier, 1)]
+    cues = prescriptions.cues(c, [t.take_id for t in sessions_compared])
+    trained = [TrainedSession(by_session[t.session_id], t, tuple(cues[t.take_id])) for t in sessions_compared]
     return FeedbackRecords(patient, trained[0], trained[1] if len(trained) == 2 else None)
 
 
 def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView | None:
-    """Put cues and strides together; None where there is nothing, `reason` says why; IntegrityError."""
-    this, before = gathered.this, gathered.before
+    """Combine cues and strides; None if there are none, with a `reason`; raises IntegrityError."""
+    this, previous = gathered.this, gathered.before
     if this is None:
         return None
     content = this.training.content
@@ -97,10 +97,12 @@ def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView 
     stood = bundle.angles is not None and bundle.angles.zero == "standing"
     curves = cycle_curves(bundle.angles, bundle.strides) if stood and bundle.angles else None
     earlier = None
-    if before is not None:
-        there = before.at.session
+    if previous is not None:
+        previous_session = previous.at.session
         earlier = PreviousTraining(
-            there.id, there.performed_on, split(_strides(reviewed, before)[1], before.cues)
+            previous_session.id,
+            previous_session.performed_on,
+            split(_strides(reviewed, previous)[1], previous.cues),
         )
     return report.feedback_view(
         content,
@@ -114,7 +116,7 @@ def view(reviewed: ReviewedAnalyses, gathered: FeedbackRecords) -> FeedbackView 
 def _strides(
     reviewed: ReviewedAnalyses, trained: TrainedSession
 ) -> tuple[Bundle, tuple[AnalysedStride, ...]]:
-    """The strides of an analysis with its edits, each with the value of what was trained."""
+    """Strides of an analysis with edits, each with its value of the trained parameter."""
     bundle = reviewed.read_bundle(trained.at.found, trained.at.edits)
     columns = reviewed.read_columns(trained.at.found, trained.at.edits)
     nothing: Column = (None,) * len(bundle.strides.strides)
@@ -122,11 +124,11 @@ def _strides(
     return bundle, report.list_analysed_strides(bundle.strides, column)
 
 
-def _analysed_take(at: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
-    """The take that the analysis of a session is of, or the reason why there is none."""
-    if at is None:
+def _analysed_take(analysed: AnalysedSession | None, takes: Sequence[TrainedTake]) -> TrainedTake | str:
+    """The live trial on which a session's analysis is based, or the reason why there is none."""
+    if analysed is None:
         return "not_analysed"
-    take = next((t for t in takes if t.recording_id == at.found.recording_id), None)
+    take = next((t for t in takes if t.recording_id == analysed.found.recording_id), None)
     if take is not None:
         return take
     return "not_analysed" if takes[-1].recording_id is None else "other_recording"

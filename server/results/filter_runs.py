@@ -1,4 +1,4 @@
-"""A take through several orientation filters: ask for it, run it in the child, publish and read results."""
+"""Comparison of orientation filters on a trial: request, run in the child, publish and read results."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ ANALYSED: Final = 0.4
 
 @dataclass(frozen=True)
 class FilterRunRecord:
-    """A finished comparison: which filters, on which analysis, against what, and which files came out."""
+    """A finished comparison: filters, analysis, reference and result files."""
 
     id: str
     analysis_id: str
@@ -56,16 +56,16 @@ class FilterRunRecord:
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and run the filters on it; pure but for `attempt` and the clock.
+    """Repeat the analysis of a trial, and run the filters on it; pure except for `attempt` and the clock.
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the reference cannot be read, or no filter ran; the code and the sentence say why.
+        the reference cannot be read, or no filter ran; code and message give the reason.
     """
     from sagittal.core.events.edits import read_edit
     from sagittal.core.events.result import Strides
@@ -104,7 +104,7 @@ def submit(
     magnetometer: bool,
     reference: str | None = None,
 ) -> JobView:
-    """Ask for a comparison on the analysis that the session shows, with its mapping, settings and edits.
+    """Request a comparison for the displayed analysis, with its mapping, settings and edits.
 
     Parameters
     ----------
@@ -113,27 +113,27 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. ParameterError: of `require_filters`.
+        the session, its analysis, or the reference. ParameterError: see `require_filters`.
     """
     require_filters(filters)
-    found = analyses.get_shown(c, session_id)
+    record = analyses.get_shown(c, session_id)
     against = None if reference is None else reference_files.get(c, session_id, reference)
     return submit_on_shown(
         c,
         queue,
         actor,
-        found,
+        record,
         COMPARE_FILTERS,
         "filters.requested",
         against=against,
-        edits=[e.to_json() for e in edit_log.edits_of(c, found.id).edits],
+        edits=[e.to_json() for e in edit_log.edits_of(c, record.id).edits],
         settings={"filters": list(dict.fromkeys(filters)), "magnetometer": magnetometer},
         reference=None if against is None else {"name": against.name, "sha256": against.sha256},
     )
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the rows of a result, in the transaction that marks its job done."""
+    """Store the rows of a result, in the transaction that marks its job done."""
     params, run_id = claim.params, new_id()
     reference = params["reference"] or {}
     row = {
@@ -154,23 +154,23 @@ def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Map
 
 def get(c: Connection, run_id: str) -> FilterRunRecord:
     """One comparison; raises NotFound."""
-    found = _runs(c, _QUERY.where(filter_run.c.id == run_id))
-    if not found:
+    runs = _runs(c, _QUERY.where(filter_run.c.id == run_id))
+    if not runs:
         raise NotFound("filter run", run_id)
-    return found[0]
+    return runs[0]
 
 
 def of_session(c: Connection, session_id: str) -> list[FilterRunRecord]:
-    """All comparisons of a session, the newest first."""
+    """All comparisons of a session, newest first."""
     newest = (filter_run.c.created_at.desc(), filter_run.c.id)
     return _runs(c, _QUERY.where(session.c.id == session_id).order_by(*newest))
 
 
-def file_bytes(blobs: BlobStore, found: FilterRunRecord, name: str) -> bytes:
-    """A result file, verified; raises NotFound, IntegrityError."""
-    if name not in found.files:
+def file_bytes(blobs: BlobStore, run: FilterRunRecord, name: str) -> bytes:
+    """Read and verify a result file; raises NotFound, IntegrityError."""
+    if name not in run.files:
         raise NotFound("file", name)
-    return blobs.read(found.patient_id, found.files[name].sha256)
+    return blobs.read(run.patient_id, run.files[name].sha256)
 
 
 _QUERY = (

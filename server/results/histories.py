@@ -1,4 +1,4 @@
-"""All analysed visits of a patient with their numbers as they count, for trends over those walked alike."""
+"""All analysed visits of a patient with current results, for trends under the same walking condition."""
 
 from __future__ import annotations
 
@@ -26,13 +26,12 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 
 @dataclass(frozen=True, eq=False)
 class PatientHistory:
-    """The visits of a patient that can be compared.
+    """Comparable visits of a patient.
 
     Parameters
     ----------
-    condition : under which all of them were walked, some perhaps with feedback; None without a visit.
-    visits : analysed, oldest first. others : visits walked otherwise, by condition. programmes : newest
-    first.
+    condition : common walking condition, possibly with feedback; None without a visit.
+    visits : analysed, oldest first. others : visits under other conditions. programmes : newest first.
     """
 
     patient: Patient
@@ -43,7 +42,7 @@ class PatientHistory:
 
     @cached_property
     def norms(self) -> tuple[Norms, ...]:
-        """Of this person at every visit, at its speed."""
+        """Norms for the patient at each visit, at its gait speed."""
         return tuple(self._find_norms(visit.numbers) for visit in self.visits)
 
     def _find_norms(self, numbers: Numbers) -> Norms:
@@ -60,7 +59,7 @@ class PatientHistory:
 
     @property
     def usual(self) -> dict[str, NormValue]:
-        """Of people of this age and sex at their comfortable speed."""
+        """Norms for the patient's age and sex at comfortable gait speed."""
         return dict(temporal_values(self._age, self.patient.sex).values)
 
     @property
@@ -70,7 +69,7 @@ class PatientHistory:
 
 @dataclass(frozen=True)
 class OtherWalks:
-    """Analysed visits under another condition: how many, and the newest of them."""
+    """Analysed visits under another condition: their number and the newest one."""
 
     condition: WalkingCondition
     count: int
@@ -79,7 +78,7 @@ class OtherWalks:
 
 @dataclass(frozen=True)
 class AnalysedSession:
-    """A session with the analysis that counts and its edits."""
+    """A session with its current analysis and edits."""
 
     session: Session
     found: analyses.AnalysisRecord
@@ -87,26 +86,27 @@ class AnalysedSession:
 
     @property
     def condition(self) -> WalkingCondition:
-        """How it was walked."""
+        """Walking condition."""
         return self.session.walked(_belt(self.found.manifest))
 
 
 def list_analysed(c: Connection, patient_id: str) -> list[AnalysedSession]:
-    """The sessions of a patient with a result, oldest first."""
-    there = sessions.of_patient(c, patient_id)
-    shown = analyses.latest_of(c, [s.id for s in there])
-    edits = edit_log.edits_of_all(c, [found.id for found in shown.values()])
+    """Sessions of a patient with a result, oldest first."""
+    patient_sessions = sessions.of_patient(c, patient_id)
+    records = analyses.latest_of(c, [s.id for s in patient_sessions])
+    edits = edit_log.edits_of_all(c, [record.id for record in records.values()])
     return [
-        AnalysedSession(s, found, edits[found.id])
-        for s in reversed(there)
-        if (found := shown.get(s.id)) is not None
+        AnalysedSession(s, record, edits[record.id])
+        for s in reversed(patient_sessions)
+        if (record := records.get(s.id)) is not None
     ]
 
 
 def baseline(done: Sequence[AnalysedSession]) -> AnalysedSession | None:
-    """The newest visit that says how somebody walks: at own pace where there is one, never with feedback.
+    """The newest visit representative of the patient's gait, if possible at comfortable pace.
 
-    Tests and squats only without a walk over ground or on a belt, daily life where there is nothing else.
+    Visits with feedback are excluded. Tests and squats are used only if there is no walk overground or on a
+    treadmill, daily life only if there is nothing else.
 
     Parameters
     ----------
@@ -126,39 +126,39 @@ def read_history(
     protocol: str | None = None,
     like: str | None = None,
 ) -> PatientHistory:
-    """Read the numbers of the visits walked under one condition; raises IntegrityError, NotFound.
+    """Read the results of the visits under one condition; raises IntegrityError, NotFound.
 
     Parameters
     ----------
-    protocol : only visits of this one. like : under the condition of this session; None = of `baseline`, else
-        of the newest visit.
+    protocol : only visits with this protocol. like : use the condition of this session; None = of `baseline`,
+        otherwise of the newest visit.
     """
-    asked = [a for a in done if protocol in {None, a.session.protocol}]
+    candidates = [a for a in done if protocol in {None, a.session.protocol}]
     if like is None:
-        chosen = baseline(asked) or (asked[-1] if asked else None)
+        chosen = baseline(candidates) or (candidates[-1] if candidates else None)
     else:
         chosen = next((a for a in done if a.session.id == like), None)
         if chosen is None:
             raise NotFound("analysed visit of this patient", like)
     planned = {v.session_id: v for plan in plans for v in plan.visits if v.session_id is not None}
     visits = []
-    for a in asked:
+    for a in candidates:
         if chosen is None or not is_alike(a.condition, chosen.condition):
             continue
         plan = planned.get(a.session.id)
         label = None if plan is None else plan.label
         kind = classify_visit(a.session, None if plan is None else plan.kind)
         visits.append(read_visit(reviewed, a, kind, label))
-    shown = {v.session_id for v in visits}
-    rest = [a for a in done if a.session.id not in shown]
+    listed = {v.session_id for v in visits}
+    unlisted = [a for a in done if a.session.id not in listed]
     condition = None if chosen is None else replace(chosen.condition, feedback=False)
-    return PatientHistory(patient, condition, tuple(visits), _others(rest), tuple(plans))
+    return PatientHistory(patient, condition, tuple(visits), _others(unlisted), tuple(plans))
 
 
 def read_visit(
     reviewed: ReviewedAnalyses, a: AnalysedSession, kind: VisitKind, label: str | None = None
 ) -> AnalysedVisit:
-    """The numbers of a visit as they count; raises IntegrityError. `kind`, `label` : as of AnalysedVisit."""
+    """Read the current results of a visit; raises IntegrityError. `kind`, `label` : as in AnalysedVisit."""
     return AnalysedVisit(
         a.session.id,
         a.session.performed_on,
@@ -171,13 +171,13 @@ def read_visit(
 
 
 def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]) -> list[PerformanceDay]:
-    """Read the days of all recordings of daily life, oldest first; raises IntegrityError."""
+    """Read the days of all daily-life recordings, oldest first; raises IntegrityError."""
 
     def read(a: AnalysedSession) -> list[PerformanceDay]:
-        found = reviewed.read_bundle(a.found, a.edits).activity
-        if found is None:
+        daily = reviewed.read_bundle(a.found, a.edits).activity
+        if daily is None:
             return []
-        return daily_trend.read_performance(a.session.id, a.session.performed_on, found)
+        return daily_trend.read_performance(a.session.id, a.session.performed_on, daily)
 
     days: list[PerformanceDay] = []
     for a in done:
@@ -187,26 +187,26 @@ def read_performance(reviewed: ReviewedAnalyses, done: Sequence[AnalysedSession]
 
 
 def read_capacity(history: PatientHistory) -> list[CapacityVisit]:
-    """Read what the walks of a history say, oldest first; none of daily life."""
-    found = (
+    """Walking capacity from the walks of a history, oldest first, excluding daily life."""
+    capacities = (
         daily_trend.read_capacity(v.session_id, v.performed_on, v.title, v.numbers.parameters)
         for v in history.visits
         if v.condition.protocol != "activity"
     )
-    return [v for v in found if v is not None]
+    return [v for v in capacities if v is not None]
 
 
 def classify_visit(session: Session, planned: VisitKind | None) -> VisitKind:
-    """Whether a visit is judged: a walk with feedback is a training whatever was planned."""
+    """Type of a visit: a walk with feedback is always a training."""
     if session.feedback:
         return "training"
     return planned or "assessment"
 
 
-def _others(rest: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
-    """Visits by condition, that of the newest first."""
+def _others(unlisted: Sequence[AnalysedSession]) -> tuple[OtherWalks, ...]:
+    """Visits by condition, in order of the newest."""
     groups: list[list[AnalysedSession]] = []
-    for a in reversed(rest):
+    for a in reversed(unlisted):
         alike = next((g for g in groups if is_alike(g[0].condition, a.condition)), None)
         if alike is None:
             groups.append([a])
@@ -221,5 +221,5 @@ def _belt(manifest: Mapping[str, Any] | None) -> float | None:
 
 
 def read(c: Connection, patient: Patient) -> tuple[list[AnalysedSession], list[programmes.Programme]]:
-    """What `read_history` needs of the database."""
+    """Read everything `read_history` requires from the database."""
     return list_analysed(c, patient.id), programmes.of_patient(c, patient.id)

@@ -1,7 +1,8 @@
-"""Prescriptions of biofeedback: written, replaced, ended, and made ready for a live take.
+"""Biofeedback prescriptions: create, replace, end, and prepare for a live trial.
 
-A record never changes: to change it ends it and writes another, so that every take and its cues point to what
-was in force. One is in force at a time; one parameter is trained (docs/science/feedback.md).
+Records are immutable: a change ends one and creates another, so that every trial and its cues refer to the
+prescription in force at the time. One prescription, for one parameter, is in force at a time
+(docs/science/feedback.md).
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class PatientPrescription:
 
     Parameters
     ----------
-    content : what is trained, its target in numbers as of that day. by : who wrote it, None = the program.
+    content : trained parameter with its numeric target as of that day. by : author, None = the program.
     ended_at : None while in force.
     """
 
@@ -55,38 +56,38 @@ def write(
     patient_id: str,
     content: Mapping[str, object],
 ) -> PatientPrescription:
-    """Prescribe feedback; what was in force ends.
+    """Prescribe feedback and end the prescription in force.
 
     Raises
     ------
-    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is not as expected.
-    ServiceError no_target: its source gives no numbers for this person; the sentence says why. both_sides: a
-    side is named of what both share.
+    NotFound: the patient. ParameterError, ServiceError bad_prescription: a field is invalid. ServiceError
+    no_target: the source has no target for this patient; the message gives the reason. both_sides: a side is
+    given for a bilateral parameter.
     """
     patient = patients.get(c, patient_id)
-    asked = Prescription.from_json(content)
-    entry = CATALOGUE[asked.parameter]
-    if entry.shared and asked.side is not None:
+    draft = Prescription.from_json(content)
+    entry = CATALOGUE[draft.parameter]
+    if entry.shared and draft.side is not None:
         raise ServiceError(
             "both_sides",
-            f"{entry.label} is the same for both sides of a walk, so the {asked.side} side is not trained "
+            f"{entry.label} is the same for both sides of a walk, so the {draft.side} side is not trained "
             "alone. Expected both sides, or another parameter.",
         )
-    made = _with_target(c, reviewed, patient, asked)
-    before = in_force(c, patient_id)
-    if before is not None:
-        _end(c, actor, before)
+    targeted = _with_target(c, reviewed, patient, draft)
+    previous = in_force(c, patient_id)
+    if previous is not None:
+        _end(c, actor, previous)
     written_id = new_id()
     c.execute(
         insert(prescription).values(
             id=written_id,
             patient_id=patient_id,
-            content=made.to_json(),
+            content=targeted.to_json(),
             created_at=now(),
             created_by=actor.user_id if actor else None,
         )
     )
-    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, made))
+    audit.record(c, actor, "prescription.written", "patient", patient_id, _said(written_id, targeted))
     return get(c, written_id)
 
 
@@ -108,24 +109,24 @@ def get(c: Connection, prescription_id: str) -> PatientPrescription:
 
 
 def of_patient(c: Connection, patient_id: str) -> list[PatientPrescription]:
-    """All prescriptions of a patient, the newest first."""
+    """All prescriptions of a patient, newest first."""
     query = _QUERY.where(prescription.c.patient_id == patient_id)
     rows = c.execute(query.order_by(prescription.c.created_at.desc(), prescription.c.id))
     return [_written(row) for row in rows]
 
 
 def in_force(c: Connection, patient_id: str) -> PatientPrescription | None:
-    """The prescription that holds now, None without one."""
+    """The prescription in force, None without one."""
     return next((w for w in of_patient(c, patient_id) if w.ended_at is None), None)
 
 
 def for_take(
     c: Connection, reviewed: ReviewedAnalyses, session_id: str
 ) -> tuple[Prescription, Baseline] | None:
-    """What a live take of this session trains, its target in numbers; None where nothing is prescribed.
+    """Prescription for a live trial of this session, with its numeric target; None if there is none.
 
-    A norm follows the person's speed: it is looked up for the last walk before this session. Where that gives
-    none, and for every other source, the numbers of the day of writing hold.
+    Norms depend on gait speed: they are looked up for the last walk before this session. If that yields none,
+    and for all other sources, the numbers from the time of prescription are used.
     """
     this = sessions.get(c, session_id)
     written = in_force(c, this.patient_id)
@@ -134,7 +135,7 @@ def for_take(
     patient = patients.get(c, this.patient_id)
     content = written.content
     by_norm = content.target.source == "norm"
-    walk = targets.last_walk(c, reviewed, patient, before=this, with_controls=by_norm)
+    walk = targets.last_walk(c, reviewed, patient, reference=this, with_controls=by_norm)
     if by_norm:
         fresh = targets.offer(walk, "norm", content.parameter, content.side).target
         content = content if fresh is None else replace(content, target=fresh)
@@ -142,25 +143,26 @@ def for_take(
 
 
 def cues(c: Connection, take_ids: Sequence[str]) -> dict[str, list[Cue]]:
-    """The cues of each of these takes in the order they were given."""
+    """Cues of each of these trials in order of time."""
     query = (
         select(live_event.c.take_id, live_event.c.content)
         .where(live_event.c.kind == "cue", live_event.c.take_id.in_(take_ids))
         .order_by(live_event.c.seq)
     )
-    given: dict[str, list[Cue]] = {take: [] for take in take_ids}
+    by_take: dict[str, list[Cue]] = {take: [] for take in take_ids}
     for take, content in c.execute(query):
-        given[take].append(Cue.from_json(content))
-    return given
+        by_take[take].append(Cue.from_json(content))
+    return by_take
 
 
 @dataclass(frozen=True)
 class TrainedTake:
-    """A live take with feedback.
+    """A live trial with feedback.
 
     Parameters
     ----------
-    recording_id : what the take became, None while it runs. content, baseline : as the take began with them.
+    recording_id : the resulting recording, None while running. content, baseline : as at the start of the
+        trial.
     """
 
     take_id: str
@@ -173,7 +175,7 @@ class TrainedTake:
 
 
 def trainings(c: Connection, patient_id: str) -> list[TrainedTake]:
-    """All live takes of a patient that gave cues, the oldest first."""
+    """All live trials of a patient with cues, oldest first."""
     rows = c.execute(_trainings(), {"of_patient": patient_id})
     return [
         TrainedTake(
@@ -219,28 +221,28 @@ def _trainings() -> Select[Any]:
 
 
 def same_training(a: Prescription, b: Prescription) -> bool:
-    """Whether what was trained is the same: a new schedule ends a record, not the training."""
+    """Whether the same parameter and side are trained; a change of schedule does not matter."""
     return (a.parameter, a.side) == (b.parameter, b.side)
 
 
 def _with_target(
-    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, asked: Prescription
+    c: Connection, reviewed: ReviewedAnalyses, patient: Patient, requested: Prescription
 ) -> Prescription:
-    source = asked.target.source
+    source = requested.target.source
     if source == "manual":
-        _refuse_impossible(asked)
-        return replace(asked, target=replace(asked.target, words="entered", session_id=None))
-    chosen = None if source == "norm" else asked.target.session_id
+        _refuse_impossible(requested)
+        return replace(requested, target=replace(requested.target, words="entered", session_id=None))
+    chosen = None if source == "norm" else requested.target.session_id
     walk = targets.last_walk(c, reviewed, patient, session_id=chosen)
-    found = targets.offer(walk, source, asked.parameter, asked.side)
-    if found.target is None:
-        raise ServiceError("no_target", found.reason or "")
-    return replace(asked, target=replace(found.target, source=source))
+    target_offer = targets.offer(walk, source, requested.parameter, requested.side)
+    if target_offer.target is None:
+        raise ServiceError("no_target", target_offer.reason or "")
+    return replace(requested, target=replace(target_offer.target, source=source))
 
 
-def _refuse_impossible(asked: Prescription) -> None:
-    """Raise ServiceError bad_prescription for an entered target that nobody walks with: 60 typed for 0.60."""
-    entry, mean, sd = CATALOGUE[asked.parameter], asked.target.mean, asked.target.sd
+def _refuse_impossible(requested: Prescription) -> None:
+    """Raise ServiceError bad_prescription for an implausible target, such as 60 typed for 0.60."""
+    entry, mean, sd = CATALOGUE[requested.parameter], requested.target.mean, requested.target.sd
     low, high = entry.target_range
     unit = f" {entry.printed_unit}" if entry.printed_unit else ""
     if mean is not None and not low <= mean <= high:
@@ -258,11 +260,11 @@ def _baseline(
     c: Connection, written: PatientPrescription, patient: Patient, walk: AnalysedWalk | None, session_id: str
 ) -> Baseline:
     content = written.content
-    given = trainings(c, patient.id)
-    alike = [t for t in given if same_training(t.content, content)]
+    trained = trainings(c, patient.id)
+    alike = [t for t in trained if same_training(t.content, content)]
     today = any(t.session_id == session_id for t in alike)
     baseline = Baseline(
-        last_level=_last_level(c, [t for t in given if t.prescription_id == written.id]),
+        last_level=_last_level(c, [t for t in trained if t.prescription_id == written.id]),
         # the block opens the visit, not its later takes
         after_training=bool(alike) and not today,
     )
@@ -278,9 +280,9 @@ def _baseline(
 def _mdc(
     patient: Patient, content: Prescription, walk: AnalysedWalk | None, side: Side
 ) -> ChangeLimit | None:
-    """Limit of change of the untrained side, from what it usually does, else from the target."""
-    there = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
-    value = content.target.mean if there is None else there.mean
+    """MDC of the untrained side, at its usual value or otherwise at the target."""
+    usual = None if walk is None else targets.find_usual_value(walk, content.parameter, side)
+    value = content.target.mean if usual is None else usual.mean
     limb: Limb | None = None
     if patient.affected_side is not None:
         limb = "affected" if side == patient.affected_side else "unaffected"
@@ -288,10 +290,10 @@ def _mdc(
 
 
 def _last_level(c: Connection, own: Sequence[TrainedTake]) -> int | None:
-    """Level of the last cue of the training proper; a block a visit opens with may have none yet."""
+    """Level of the last cue of the training itself; probe blocks at the start may have none yet."""
     for training in reversed(own):
-        given = cues(c, [training.take_id])[training.take_id]
-        levels = [q.level for q in given if q.why_not not in {"baseline", "retention"}]
+        trial_cues = cues(c, [training.take_id])[training.take_id]
+        levels = [q.level for q in trial_cues if q.why_not not in {"baseline", "retention"}]
         if levels:
             return levels[-1]
     return None

@@ -1,4 +1,4 @@
-"""Repairs of a set-up: what an analysis proposes, and set-ups of earlier ones, to be asked for again."""
+"""Corrections of the sensor setup: proposals of an analysis, and setups of earlier ones to restore."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
 
 @dataclass(frozen=True)
 class ProposedRepair:
-    """What is wrong, in sentences, and the manifest that would put it right.
+    """Detected setup errors, in sentences, and a corrected manifest.
 
     Parameters
     ----------
-    changes : what each sensor would be taken for, in sentences.
+    changes : change for each sensor, in sentences.
     """
 
     evidence: tuple[str, ...]
@@ -33,62 +33,64 @@ class ProposedRepair:
     changes: tuple[str, ...]
 
 
-def read_proposal(c: Connection, blobs: BlobStore, found: AnalysisRecord) -> ProposedRepair | None:
-    """What an analysis proposes; None where it proposes nothing, or its files are no longer the session's."""
-    if REPAIRED not in found.files:
+def read_proposal(c: Connection, blobs: BlobStore, record: AnalysisRecord) -> ProposedRepair | None:
+    """Correction proposed by an analysis; None if there is none or its files are not the session's any
+    more.
+    """
+    if REPAIRED not in record.files:
         return None
-    this = recordings.current(c, found.session_id)
-    if this is None or this.id != found.recording_id:
+    this = recordings.current(c, record.session_id)
+    if this is None or this.id != record.recording_id:
         return None
-    said = json.loads(file_bytes(blobs, found, "analysis.json"))["setup"]
-    repaired = json.loads(file_bytes(blobs, found, REPAIRED))
-    changes = _list_changes(repaired, found.manifest)
-    return ProposedRepair(tuple(said["evidence"]), take_setup(this.manifest, repaired), changes)
+    setup = json.loads(file_bytes(blobs, record, "analysis.json"))["setup"]
+    repaired = json.loads(file_bytes(blobs, record, REPAIRED))
+    changes = _list_changes(repaired, record.manifest)
+    return ProposedRepair(tuple(setup["evidence"]), take_setup(this.manifest, repaired), changes)
 
 
-def _list_changes(repaired: Mapping[str, Any], before: Mapping[str, Any] | None) -> tuple[str, ...]:
-    """Sensors that would be taken as worn elsewhere or read otherwise.
+def _list_changes(repaired: Mapping[str, Any], current_manifest: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """Sensors with a changed segment or reading.
 
     Parameters
     ----------
-    repaired : the manifest that is proposed. before : that of the analysis that proposes it.
+    repaired : the proposed manifest. current_manifest : manifest of the analysis that proposes it.
     """
-    said = manifest_of(before or {})
-    wanted = manifest_of({key: repaired.get(key) for key in SETUP_KEYS})
-    worn = {d.lower(): s for d, s in said.sensors.items()}
-    known = {d.lower(): x for d, x in said.corrections.items()}
+    current = manifest_of(current_manifest or {})
+    proposed = manifest_of({key: repaired.get(key) for key in SETUP_KEYS})
+    segments = {d.lower(): s for d, s in current.sensors.items()}
+    known_corrections = {d.lower(): x for d, x in current.corrections.items()}
     changes = []
-    for device, segment in sorted(wanted.sensors.items()):
-        was = worn.get(device.lower())
+    for device, segment in sorted(proposed.sensors.items()):
+        was = segments.get(device.lower())
         if segment is not None and was != segment:
             changes.append(f"Sensor {device} goes {'' if was is None else f'from {was} '}to {segment}.")
-    for device, correction in sorted(wanted.corrections.items()):
-        if correction != known.get(device.lower()):
+    for device, correction in sorted(proposed.corrections.items()):
+        if correction != known_corrections.get(device.lower()):
             changes.append(f"Of sensor {device} {correction.say()}.")
-    for place, words in sorted(wanted.mounting.items()):
-        declared = said.mounting.get(place)
+    for place, words in sorted(proposed.mounting.items()):
+        declared = current.mounting.get(place)
         if words != declared:
             instead = "" if declared is None else f", not “{declared}”"
             changes.append(f"The sensor of {place} is worn “{words}”{instead}.")
     return tuple(changes)
 
 
-def read_without_limits(c: Connection, found: AnalysisRecord) -> dict[str, Any] | None:
-    """The manifest of an analysis without what a person said of a test's start and end.
+def read_without_limits(c: Connection, record: AnalysisRecord) -> dict[str, Any] | None:
+    """Manifest of an analysis without user-defined test limits.
 
-    None where its files are no longer the session's.
+    None if its files are not the session's any more.
     """
-    this = recordings.current(c, found.session_id)
-    if this is None or this.id != found.recording_id:
+    this = recordings.current(c, record.session_id)
+    if this is None or this.id != record.recording_id:
         return None
     return {key: value for key, value in (this.manifest or {}).items() if key != "test_limits"}
 
 
-def take_setup(manifest: Mapping[str, Any] | None, other: Mapping[str, Any] | None) -> dict[str, Any]:
-    """A manifest with the set-up of another one; height, protocol and columns stay.
+def take_setup(manifest: Mapping[str, Any] | None, source: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Replace the setup of a manifest by that of another; height, protocol and columns are retained.
 
     >>> take_setup({"protocol": "walk", "corrections": {}}, {"sensors": {"A": "pelvis"}, "protocol": "tug"})
     {'protocol': 'walk', 'sensors': {'A': 'pelvis'}}
     """
-    said = {key: value for key, value in (manifest or {}).items() if key not in SETUP_KEYS}
-    return said | {key: (other or {})[key] for key in SETUP_KEYS if key in (other or {})}
+    retained = {key: value for key, value in (manifest or {}).items() if key not in SETUP_KEYS}
+    return retained | {key: (source or {})[key] for key in SETUP_KEYS if key in (source or {})}

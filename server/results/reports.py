@@ -1,4 +1,4 @@
-"""The report of an analysis: its stored files and edits put into words, for pages, API and tables."""
+"""Report of an analysis: stored files and edits, worded for pages, API and tables."""
 
 from __future__ import annotations
 
@@ -24,21 +24,21 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 
 def read(
     reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     edits: edit_log.EditHistory,
     patient: Patient,
     session: Session,
-    before: AnalysedSession | None = None,
+    previous: AnalysedSession | None = None,
     control_visits: Sequence[ControlVisit] = (),
 ) -> tuple[Bundle, ReportModel]:
-    """Describe an analysis with its edits for this person on that day; raises IntegrityError.
+    """Describe an analysis with edits for a patient and date; raises IntegrityError.
 
     Parameters
     ----------
-    before : the visit that the table is compared with, None = none.
+    previous : visit with which the table is compared, None = none.
     control_visits : of the clinic's own controls.
     """
-    bundle = reviewed.read_bundle(found, edits)
+    bundle = reviewed.read_bundle(record, edits)
     age = patient.find_age(session.performed_on)
     height = patient.find_height(session)
     speed = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
@@ -51,13 +51,13 @@ def read(
         controls=controls.make_group(reviewed, control_visits, speed),
         treadmill=session.protocol == "treadmill",
     )
-    model = replace(model, condition=AnalysedSession(session, found, edits).condition.words)
-    if before is None:
+    model = replace(model, condition=AnalysedSession(session, record, edits).condition.words)
+    if previous is None:
         return bundle, model
-    old, new = reviewed.read_numbers(before.found, before.edits), reviewed.read_numbers(found, edits)
-    known = pair_norms(patient, (before.session, old), (session, new))
-    changed = compare_figures(old, new, known, patient.affected_side)
-    since = PreviousVisit(before.session.id, before.session.performed_on)
+    old, new = reviewed.read_numbers(previous.found, previous.edits), reviewed.read_numbers(record, edits)
+    norm_pair = pair_norms(patient, (previous.session, old), (session, new))
+    changed = compare_figures(old, new, norm_pair, patient.affected_side)
+    since = PreviousVisit(previous.session.id, previous.session.performed_on)
     headline = model.headline
     if headline is not None and model.quality.kind != "bad":
         facts = sort_changes(changed)
@@ -69,19 +69,19 @@ def read(
 
 def behind_number(
     reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     edits: edit_log.EditHistory,
     patient: Patient,
     session: Session,
     name: str,
     control_visits: Sequence[ControlVisit] = (),
 ) -> ParameterStrides:
-    """One parameter with the strides behind it; raises NotFound, IntegrityError."""
-    bundle, model = read(reviewed, found, edits, patient, session, control_visits=control_visits)
+    """One parameter with its strides; raises NotFound, IntegrityError."""
+    bundle, model = read(reviewed, record, edits, patient, session, control_visits=control_visits)
     row = next((r for _, rows in model.groups for r in rows if r.name == name), None)
     if row is None:
         raise NotFound("parameter", name)
-    columns = reviewed.read_columns(found, edits)
+    columns = reviewed.read_columns(record, edits)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     column = columns.get(name) or level_column(name, bundle.strides, columns, standing)
     return open_row(row, bundle.strides, column, model.duration_s)

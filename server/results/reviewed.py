@@ -1,7 +1,7 @@
-"""Finished analyses as they count: what is stored, with what its live edits give.
+"""Current state of finished analyses: stored results combined with the edits in effect.
 
-A stored analysis never changes. The events, strides and parameters that count are measured from its tracks
-and the live edits, by the function that the pipeline ends with.
+A stored analysis never changes. Current events, strides and parameters are recomputed from its tracks and
+edits by the last function of the pipeline.
 """
 
 from __future__ import annotations
@@ -52,14 +52,14 @@ words, a speed one row."""
 
 @dataclass(frozen=True, eq=False)
 class StoredAnalysis:
-    """A finished analysis in memory; one without `tracks`, of an earlier version, cannot be edited."""
+    """A finished analysis in memory; without `tracks` (earlier versions) it cannot be edited."""
 
     bundle: Bundle
     tracks: Tracks | None
 
     @property
     def fixed_because(self) -> str | None:
-        """Why nothing of it can be edited, None where it can."""
+        """Reason why it cannot be edited, None if it can."""
         if self.tracks is not None:
             return None
         stopped = next((n.message for n in self.bundle.warnings if n.severity == "error"), None)
@@ -74,11 +74,11 @@ class StoredAnalysis:
 
 
 class ReviewedAnalyses:
-    """The analyses of an installation as they count; those at work are kept in memory. Any thread may use it.
+    """Current analyses of an installation, with a cache of those in use; thread-safe.
 
     Parameters
     ----------
-    blobs : the store of the result files.
+    blobs : store of the result files.
     """
 
     def __init__(self, blobs: BlobStore) -> None:
@@ -92,11 +92,11 @@ class ReviewedAnalyses:
         self._parts: RecentValues[Any] = RecentValues(PARTS_KEPT)
         self._pages: RecentValues[Any] = RecentValues(PAGES_KEPT)
 
-    def open(self, found: analyses.AnalysisRecord) -> StoredAnalysis:
-        """Return an analysis as it is stored, read once while it is at work; raises IntegrityError."""
+    def open(self, record: analyses.AnalysisRecord) -> StoredAnalysis:
+        """Return an analysis as stored, cached while in use; raises IntegrityError."""
 
         def read() -> StoredAnalysis:
-            files = self._read_files(found, NOT_READ)
+            files = self._read_files(record, NOT_READ)
             stored = load_bundle(files)
             if tracks.NAME not in files:
                 return StoredAnalysis(stored, None)
@@ -104,119 +104,119 @@ class ReviewedAnalyses:
                 stored, tracks.read_tracks(files[tracks.NAME], stored.events, stored.angles)
             )
 
-        return self._analyses.get(found.id, read)
+        return self._analyses.get(record.id, read)
 
-    def measure(self, found: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
-        """Return what the live edits give; None without an edit: then the stored analysis counts."""
+    def measure(self, record: analyses.AnalysisRecord, edits: EditHistory) -> MeasuredGait | None:
+        """Return results recomputed with the edits; None without edits, when the stored results apply."""
         if not edits.made:
             return None
-        return self._results.get((found.id, edits.key), lambda: self.measure_anew(found, edits.edits))
+        return self._results.get((record.id, edits.key), lambda: self.measure_anew(record, edits.edits))
 
-    def measure_anew(self, found: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
-        """Measure with these edits, without looking into the memory or keeping the result.
+    def measure_anew(self, record: analyses.AnalysisRecord, edits: tuple[Edit, ...]) -> MeasuredGait:
+        """Recompute with these edits, bypassing the cache.
 
         Raises
         ------
         Conflict no_tracks, IntegrityError, ParameterError of sagittal.core.events.edits.
         """
-        known = self.open(found)
-        if known.tracks is None:
-            raise Conflict("no_tracks", known.fixed_because or "")
-        return measure_gait(known.tracks, edits)
+        stored = self.open(record)
+        if stored.tracks is None:
+            raise Conflict("no_tracks", stored.fixed_because or "")
+        return measure_gait(stored.tracks, edits)
 
-    def keep_result(self, found: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
-        """Keep what `measure_anew` gave for these edits."""
-        self._results.put((found.id, edits.key), result)
+    def keep_result(self, record: analyses.AnalysisRecord, edits: EditHistory, result: MeasuredGait) -> None:
+        """Cache the result of `measure_anew` for these edits."""
+        self._results.put((record.id, edits.key), result)
 
-    def read_columns(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
-        """Return figures of every stride of the list as they count, by parameter; raises IntegrityError."""
-        result = self.measure(found, edits)
+    def read_columns(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Mapping[str, Column]:
+        """Return current values of all strides, by parameter; raises IntegrityError."""
+        result = self.measure(record, edits)
         if result is not None:
             return result.columns
-        if "strides.csv" not in found.files:
+        if "strides.csv" not in record.files:
             return {}
-        return read_columns(analyses.file_bytes(self.blobs, found, "strides.csv"))
+        return read_columns(analyses.file_bytes(self.blobs, record, "strides.csv"))
 
-    def read_bundle(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
-        """Return the analysis with what its live edits give; raises IntegrityError."""
-        stored, result = self.open(found).bundle, self.measure(found, edits)
+    def read_bundle(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+        """Return the analysis with its edits applied; raises IntegrityError."""
+        stored, result = self.open(record).bundle, self.measure(record, edits)
         return stored if result is None else apply_review(stored, result, edits.edits)
 
-    def read_without_tracks(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
-        """Return the same of one that nobody works on: without an edit its tracks are not read, nor kept.
+    def read_without_tracks(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Bundle:
+        """Return an analysis that is not being edited; without edits its tracks are neither read nor cached.
 
         Raises
         ------
         IntegrityError, FormatError as `read_bundle`.
         """
         if edits.made:
-            return self.read_bundle(found, edits)
-        return load_bundle(self._read_files(found, {*NOT_READ, tracks.NAME}))
+            return self.read_bundle(record, edits)
+        return load_bundle(self._read_files(record, {*NOT_READ, tracks.NAME}))
 
-    def _read_files(self, found: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
-        names = [n for n in found.files if n not in left_out and not n.startswith(EXPORTED)]
-        return {name: analyses.file_bytes(self.blobs, found, name) for name in names}
+    def _read_files(self, record: analyses.AnalysisRecord, left_out: Collection[str]) -> dict[str, bytes]:
+        names = [n for n in record.files if n not in left_out and not n.startswith(EXPORTED)]
+        return {name: analyses.file_bytes(self.blobs, record, name) for name in names}
 
-    def read_numbers(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
-        """Return parameters and scores as they count; without an edit no signal is read.
+    def read_numbers(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Numbers:
+        """Return current parameters and scores; without edits no signal is read.
 
         Raises
         ------
         IntegrityError
-            a result file is not what it was.
+            a result file is damaged.
         """
 
         def read() -> Numbers:
             if not edits.made:
-                stored = read_numbers(analyses.file_bytes(self.blobs, found, "analysis.json"))
+                stored = read_numbers(analyses.file_bytes(self.blobs, record, "analysis.json"))
                 if stored is not None:
                     return stored
-            return numbers_of(self.read_bundle(found, edits))
+            return numbers_of(self.read_bundle(record, edits))
 
-        return self._numbers.get((found.id, edits.key), read)
+        return self._numbers.get((record.id, edits.key), read)
 
-    def read_means(self, found: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
-        """Return what a control's walk gives to a reference; without an edit no angles are read.
+    def read_means(self, record: analyses.AnalysisRecord, edits: EditHistory) -> WalkMeans:
+        """Return the contribution of a control's walk to a reference; without edits no angles are read.
 
         Raises
         ------
         IntegrityError, FormatError as `read_bundle`.
         """
         if not edits.made:
-            stored = read_means(analyses.file_bytes(self.blobs, found, "analysis.json"))
+            stored = read_means(analyses.file_bytes(self.blobs, record, "analysis.json"))
             if stored is not None:
                 return stored
-        return means_of(self.read_without_tracks(found, edits))
+        return means_of(self.read_without_tracks(record, edits))
 
-    def read_verdict(self, found: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
-        """Return shape and word for the data of an analysis, as lists show it; raises IntegrityError."""
-        return self._verdicts.get((found.id, edits.key), lambda: self.read_numbers(found, edits).verdict)
+    def read_verdict(self, record: analyses.AnalysisRecord, edits: EditHistory) -> tuple[str, str]:
+        """Return symbol and word for the data quality of an analysis, for lists; raises IntegrityError."""
+        return self._verdicts.get((record.id, edits.key), lambda: self.read_numbers(record, edits).verdict)
 
-    def read_speed(self, found: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
-        """Return the walking speed of an analysis, as lists show it; raises IntegrityError."""
+    def read_speed(self, record: analyses.AnalysisRecord, edits: EditHistory) -> Parameter | None:
+        """Return the gait speed of an analysis, for lists; raises IntegrityError."""
 
         def read() -> Parameter | None:
-            numbers = self.read_numbers(found, edits)
+            numbers = self.read_numbers(record, edits)
             return next((p for p in numbers.parameters if p.name == "gait_speed_mps"), None)
 
-        return self._speeds.get((found.id, edits.key), read)
+        return self._speeds.get((record.id, edits.key), read)
 
     def keep_part(self, key: tuple[str, ...], make_value: Callable[[], _Value]) -> _Value:
-        """Return a part that is looked at again and again, by a key that begins with the analysis's id."""
+        """Cache a frequently used part by a key that begins with the analysis's id."""
         return cast("_Value", self._parts.get(key, make_value))
 
     def keep_control(
-        self, found: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
+        self, record: analyses.AnalysisRecord, edits: EditHistory, make_value: Callable[[], ControlSession]
     ) -> ControlSession:
-        """Return what serves as reference of a finished analysis of a control."""
-        return self._controls.get((found.id, edits.key), make_value)
+        """Cache the reference data of a finished analysis of a control."""
+        return self._controls.get((record.id, edits.key), make_value)
 
     def keep_page(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
-        """Return what a page shows of analyses, drawn once for the same records; `key` names all of them."""
+        """Cache page content derived from analyses; `key` must identify all of them."""
         return cast("_Value", self._pages.get(key, make_value))
 
     def forget(self) -> None:
-        """Keep nothing in memory: what is erased on disk must not stay here."""
+        """Clear all caches, so that erased data do not remain in memory."""
         for memory in (
             self._analyses,
             self._results,
@@ -231,7 +231,7 @@ class ReviewedAnalyses:
 
 
 class RecentValues(Generic[_Value]):
-    """The values used last, at most `size` of them; any thread may use it."""
+    """LRU cache of at most `size` values; thread-safe."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -242,12 +242,12 @@ class RecentValues(Generic[_Value]):
         return len(self._values)
 
     def clear(self) -> None:
-        """Forget all that is kept in memory."""
+        """Clear the cache."""
         with self._lock:
             self._values.clear()
 
     def get(self, key: Hashable, make_value: Callable[[], _Value]) -> _Value:
-        """Return the value of a key, made and kept when it is not there."""
+        """Return the value of a key, computing and caching it if absent."""
         with self._lock:
             if key in self._values:
                 self._values.move_to_end(key)
@@ -257,7 +257,7 @@ class RecentValues(Generic[_Value]):
         return value
 
     def put(self, key: Hashable, value: _Value) -> None:
-        """Keep a value; the one that was used longest ago may have to go."""
+        """Cache a value, evicting the least recently used one if full."""
         with self._lock:
             self._values[key] = value
             self._values.move_to_end(key)

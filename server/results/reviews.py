@@ -1,7 +1,7 @@
-"""What people change in a finished analysis: edits kept in order, undone by a row too, measured at once.
+"""Edits of a finished analysis by users: logged in order, undoable, and applied immediately.
 
-Two people may review one session: who edits says which state was seen (`version`), and any but the newest is
-refused.
+Two users may review the same session: each edit states the version it is based on (`version`), and any but
+the latest is rejected.
 """
 
 from __future__ import annotations
@@ -40,34 +40,34 @@ def make(
     session_id: str,
     edit: Edit,
     *,
-    seen: int | None = None,
+    base_version: int | None = None,
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Change the analysis that a session shows.
+    """Edit the displayed analysis of a session.
 
     Parameters
     ----------
-    seen : version on which the person decided; None = whatever there is.
+    base_version : version on which the edit is based; None = any.
 
     Raises
     ------
-    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks.
-    ParameterError of sagittal.core.events.edits.
+    NotFound: no analysis. Conflict: edited_meanwhile, no_tracks. ParameterError of
+    sagittal.core.events.edits.
     """
-    found, before = _state(db, session_id, seen)
-    return found, _make(db, reviewed, actor, session_id, found, before, edit, ACTIONS[edit.kind])
+    record, history = _state(db, session_id, base_version)
+    return record, _make(db, reviewed, actor, session_id, record, history, edit, ACTIONS[edit.kind])
 
 
 def undo(
-    db: Database, actor: audit.Actor | None, session_id: str, *, seen: int | None = None
+    db: Database, actor: audit.Actor | None, session_id: str, *, base_version: int | None = None
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Take the last live edit back; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
-    found, before = _state(db, session_id, seen)
-    if not before.made:
+    """Undo the last edit in effect; raises NotFound, Conflict nothing_to_undo, edited_meanwhile."""
+    record, history = _state(db, session_id, base_version)
+    if not history.made:
         raise Conflict("nothing_to_undo", "Nothing has been changed in this analysis.")
     with db.write() as c:
-        _refuse_older(c, found, before)
-        _append(c, actor, session_id, found, UNDO, {}, ACTIONS[UNDO])
-        return found, edits_of(c, found.id)
+        _refuse_older(c, record, history)
+        _append(c, actor, session_id, record, UNDO, {}, ACTIONS[UNDO])
+        return record, edits_of(c, record.id)
 
 
 def redo(
@@ -76,13 +76,13 @@ def redo(
     actor: audit.Actor | None,
     session_id: str,
     *,
-    seen: int | None = None,
+    base_version: int | None = None,
 ) -> tuple[analyses.AnalysisRecord, EditHistory]:
-    """Make the last undone edit again; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
-    found, before = _state(db, session_id, seen)
-    if not before.undone:
+    """Redo the last undone edit; raises NotFound, Conflict nothing_to_redo, edited_meanwhile."""
+    record, history = _state(db, session_id, base_version)
+    if not history.undone:
         raise Conflict("nothing_to_redo", "There is no undone change in this analysis.")
-    return found, _make(db, reviewed, actor, session_id, found, before, before.undone[-1], REDONE)
+    return record, _make(db, reviewed, actor, session_id, record, history, history.undone[-1], REDONE)
 
 
 def _make(
@@ -90,32 +90,34 @@ def _make(
     reviewed: ReviewedAnalyses,
     actor: audit.Actor | None,
     session_id: str,
-    found: analyses.AnalysisRecord,
-    before: EditHistory,
+    record: analyses.AnalysisRecord,
+    history: EditHistory,
     edit: Edit,
     action: str,
 ) -> EditHistory:
     # measured before the lock is taken: what cannot be is refused, and nobody waits for it
-    result = reviewed.measure_anew(found, (*before.edits, edit))
+    result = reviewed.measure_anew(record, (*history.edits, edit))
     with db.write() as c:
-        _refuse_older(c, found, before)
-        _append(c, actor, session_id, found, edit.kind, edit.to_json(), action)
-        after = edits_of(c, found.id)
-    reviewed.keep_result(found, after, result)
-    return after
+        _refuse_older(c, record, history)
+        _append(c, actor, session_id, record, edit.kind, edit.to_json(), action)
+        updated = edits_of(c, record.id)
+    reviewed.keep_result(record, updated, result)
+    return updated
 
 
-def _state(db: Database, session_id: str, seen: int | None) -> tuple[analyses.AnalysisRecord, EditHistory]:
+def _state(
+    db: Database, session_id: str, base_version: int | None
+) -> tuple[analyses.AnalysisRecord, EditHistory]:
     with db.read() as c:
-        found = analyses.get_shown(c, session_id)
-        edits = edits_of(c, found.id)
-    if seen is not None and seen != edits.version:
+        record = analyses.get_shown(c, session_id)
+        edits = edits_of(c, record.id)
+    if base_version is not None and base_version != edits.version:
         raise _meanwhile()
-    return found, edits
+    return record, edits
 
 
-def _refuse_older(c: Connection, found: analyses.AnalysisRecord, before: EditHistory) -> None:
-    if edits_of(c, found.id).version != before.version:
+def _refuse_older(c: Connection, record: analyses.AnalysisRecord, history: EditHistory) -> None:
+    if edits_of(c, record.id).version != history.version:
         raise _meanwhile()
 
 
@@ -130,13 +132,13 @@ def _append(
     c: Connection,
     actor: audit.Actor | None,
     session_id: str,
-    found: analyses.AnalysisRecord,
+    analysis_record: analyses.AnalysisRecord,
     kind: str,
     content: dict[str, Any],
     action: str,
 ) -> None:
     values = {
-        "analysis_id": found.id,
+        "analysis_id": analysis_record.id,
         "kind": kind,
         "content": content,
         "user_id": actor.user_id if actor else None,
@@ -144,5 +146,5 @@ def _append(
     }
     c.execute(insert(rows).values(values))
     # the reason is free text and stays out of a trail that outlives an erasure
-    said = {k: v for k, v in content.items() if k != "reason"}
-    audit.record(c, actor, action, "session", session_id, {"analysis_id": found.id, **said})
+    fields = {k: v for k, v in content.items() if k != "reason"}
+    audit.record(c, actor, action, "session", session_id, {"analysis_id": analysis_record.id, **fields})

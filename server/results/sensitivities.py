@@ -1,6 +1,6 @@
-"""Sensitivity analyses of squats: asked for, run in the child, and read again.
+"""Sensitivity analyses of squats: request, run in the child, and read results.
 
-The results are files of the analysis that was looked at, named by the job; so they live and go with it.
+Results are stored as files of the underlying analysis, named by the job, and deleted with it.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class StoredSensitivity:
 
     Parameters
     ----------
-    reference : name of the reference that errors are of; None = changes of the take's own angles.
-    from_standing : angles were zeroed on standing, as the session shows them; else anatomical.
+    reference : name of the reference for errors; None = changes relative to the trial's own angles.
+    from_standing : angles are relative to standing, as on the session's pages; otherwise anatomical.
     files : names among the files of the analysis.
     """
 
@@ -58,7 +58,7 @@ class StoredSensitivity:
 
 
 def read_reference(content: bytes, name: str, *, from_standing: bool) -> ReferenceAngles:
-    """Angles of an angles.parquet, from standing or anatomical.
+    """Angles of an angles.parquet, relative to standing or anatomical.
 
     Raises
     ------
@@ -73,21 +73,21 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
             "reference_unreadable", f"“{name}” is not the angles.parquet of an analysis or a simulation."
         ) from error
     offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
-    known = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
-    return ReferenceAngles(angles.t_s, known)
+    by_name = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
+    return ReferenceAngles(angles.t_s, by_name)
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Analyse a take as its analysis did, and put every parameter off; pure but for `attempt`.
+    """Repeat the analysis of a trial, and perturb every parameter; pure except for `attempt`.
 
     Parameters
     ----------
-    files : of the recording, and the reference as the last where `params` names one.
+    files : of the recording, followed by the reference if `params` names one.
 
     Raises
     ------
     SagittalError
-        the take has no squats that were followed, the reference cannot be read or does not fit.
+        the trial has no tracked squats, or the reference cannot be read or does not match.
     """
     from sagittal.core.body.chain.geometry import LegGeometry
     from sagittal.core.squat.sensitivity import analyse_legs
@@ -98,10 +98,10 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         reference = read_reference(last.read(), last.name, from_standing=settings["from_standing"])
     take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
-        why = "" if take.problem is None else f" {take.problem.message}"
-        raise EstimationError("no_squats", f"The legs of this take were not followed.{why}")
+        reason = "" if take.problem is None else f" {take.problem.message}"
+        raise EstimationError("no_squats", f"The legs of this take were not followed.{reason}")
     height = take.recording.subject.height_m
-    found = analyse_legs(
+    tables = analyse_legs(
         take.calibrated,
         [LegGeometry.from_height(height, side) for side in take.legs],
         reference,
@@ -109,8 +109,8 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         params=take.config.squat.chain,
         progress=lambda _, share: attempt.progress("parameters", ANALYSED + (1.0 - ANALYSED) * share),
     )
-    told = summarise_sensitivity(found, settings["reference"], from_standing=settings["from_standing"])
-    return sensitivity_files(told, "sensitivity")
+    summary = summarise_sensitivity(tables, settings["reference"], from_standing=settings["from_standing"])
+    return sensitivity_files(summary, "sensitivity")
 
 
 def submit(
@@ -122,7 +122,7 @@ def submit(
     reference: str | None = None,
     from_standing: bool = True,
 ) -> JobView:
-    """Ask for it on the analysis that the session shows, with its mapping and settings; done once.
+    """Request an analysis for the displayed one, with its mapping and settings; idempotent.
 
     Parameters
     ----------
@@ -131,27 +131,27 @@ def submit(
     Raises
     ------
     NotFound
-        the session, its analysis, the reference. Conflict: not_squats.
+        the session, its analysis, or the reference. Conflict: not_squats.
     """
     if sessions.get(c, session_id).protocol != "squat":
         raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")
-    found = analyses.get_shown(c, session_id)
+    record = analyses.get_shown(c, session_id)
     against = None if reference is None else reference_files.get(c, session_id, reference)
     settings = {"reference": reference, "from_standing": from_standing}
     return submit_on_shown(
-        c, queue, actor, found, SENSITIVITY, "sensitivity.requested", against=against, settings=settings
+        c, queue, actor, record, SENSITIVITY, "sensitivity.requested", against=against, settings=settings
     )
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the files of a result, in the transaction that marks its job done."""
+    """Store the files of a result, in the transaction that marks its job done."""
     for name, blob in stored.items():
         row = {"name": _name(claim.job_id, name), "size": blob.size, "sha256": blob.sha256}
         c.execute(insert(analysis_file).values(analysis_id=claim.params["analysis_id"], **row))
 
 
 def get(c: Connection, job_id: str) -> StoredSensitivity:
-    """One that is finished; raises NotFound."""
+    """One finished analysis; raises NotFound."""
     row = c.execute(_QUERY.where(job.c.id == job_id)).first()
     if row is None:
         raise NotFound("sensitivity analysis", job_id)
@@ -159,15 +159,15 @@ def get(c: Connection, job_id: str) -> StoredSensitivity:
 
 
 def of_session(c: Connection, session_id: str) -> list[StoredSensitivity]:
-    """All that are finished, the newest first; raises NotFound for the session."""
+    """All finished analyses, newest first; raises NotFound for the session."""
     sessions.get(c, session_id)
     rows = c.execute(_QUERY.where(recording.c.session_id == session_id).order_by(job.c.finished_at.desc()))
     return [_stored(row) for row in rows]
 
 
-def find_file(c: Connection, found: StoredSensitivity) -> tuple[analyses.AnalysisRecord, str]:
-    """The analysis that keeps the result, and the name of its JSON."""
-    return analyses.get(c, found.analysis_id), found.files[0]
+def find_file(c: Connection, stored: StoredSensitivity) -> tuple[analyses.AnalysisRecord, str]:
+    """The analysis that stores the result, and the name of its JSON."""
+    return analyses.get(c, stored.analysis_id), stored.files[0]
 
 
 def _name(job_id: str, name: str) -> str:

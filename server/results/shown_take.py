@@ -1,4 +1,4 @@
-"""Jobs on the analysis that a session shows: on its recording as it was analysed, or on its result files."""
+"""Jobs on a session's displayed analysis: on its recording as analysed, or on its result files."""
 
 from __future__ import annotations
 
@@ -18,55 +18,55 @@ def submit_on_shown(
     c: Connection,
     queue: JobQueue,
     actor: audit.Actor | None,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     kind: str,
     action: str,
     *,
     against: recordings.RecordedFile | None,
     **own: Any,
 ) -> JobView:
-    """Ask for a job; the same one is done once.
+    """Request a job on the displayed analysis; idempotent.
 
     Parameters
     ----------
-    found : the analysis that is shown. action : in the audit log. against : a reference, last of the job's
-        files. own : parameters of this kind of job.
+    record : the displayed analysis. action : in the audit log. against : a reference, added as last file of
+        the job. own : parameters specific to this kind of job.
     """
-    inputs = recordings.job_inputs(recordings.get(c, found.recording_id))
+    inputs = recordings.job_inputs(recordings.get(c, record.recording_id))
     if against is not None:
         inputs["files"].append({"name": against.name, "size": against.size, "sha256": against.sha256})
     params = {
         **inputs,
-        "manifest": found.manifest or {},
-        "config": dict(found.config),
-        "analysis_id": found.id,
+        "manifest": record.manifest or {},
+        "config": dict(record.config),
+        "analysis_id": record.id,
         **own,
     }
-    return submit_for(c, queue, actor, found, kind, action, params)
+    return submit_for(c, queue, actor, record, kind, action, params)
 
 
 def submit_for(
     c: Connection,
     queue: JobQueue,
     actor: audit.Actor | None,
-    found: analyses.AnalysisRecord,
+    analysis_record: analyses.AnalysisRecord,
     kind: str,
     action: str,
     params: Mapping[str, Any],
 ) -> JobView:
-    """Ask for a job on an analysis; the same one is done once."""
+    """Request a job on an analysis; idempotent."""
     view = queue.submit(
         c,
-        key=make_key(found, kind, params),
+        key=make_key(analysis_record, kind, params),
         kind=kind,
         params=params,
-        recording_id=found.recording_id,
+        recording_id=analysis_record.recording_id,
         requested_by=actor.user_id if actor else None,
     )
-    audit.record(c, actor, action, "session", found.session_id, {"job_id": view.id})
+    audit.record(c, actor, action, "session", analysis_record.session_id, {"job_id": view.id})
     return view
 
 
-def make_key(found: analyses.AnalysisRecord, kind: str, params: Mapping[str, Any]) -> str:
-    """What names a job on an analysis: equal keys give equal results."""
-    return f"{found.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}"
+def make_key(record: analyses.AnalysisRecord, kind: str, params: Mapping[str, Any]) -> str:
+    """Key of a job on an analysis: equal keys give equal results."""
+    return f"{record.id}:{kind}:{analyses.digest_json(params)}:{CODE_VERSION}"

@@ -1,8 +1,8 @@
-"""Signals of a finished analysis for the eye: named lanes, each thinned to what a screen can show.
+"""Signals of a finished analysis for display: named lanes, downsampled to screen resolution.
 
-Derived: pitch and rate of the feet, how high they are, every joint angle. Raw: what each sensor measured, in
-its own axes. A window of a lane is answered as the least and the greatest value of equal parts of it, so that
-no peak is lost, however far one zooms out.
+Derived: pitch, angular rate and height of the feet, every joint angle. Raw: measurements of each sensor in
+its own axes. A window of a lane is returned as minimum and maximum of equal bins, so that peaks are preserved
+at any zoom.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class SignalLane:
 
     Parameters
     ----------
-    lines : what is drawn in it: "left", "right" or "x", "y", "z". up : which way is up, in words.
-    raw : of one sensor, as measured.
+    lines : its curves: "left", "right" or "x", "y", "z". up : meaning of positive values, in words.
+    raw : measurement of one sensor.
     """
 
     name: str
@@ -56,8 +56,8 @@ class SignalWindow:
 
     Parameters
     ----------
-    start_s, step_s : time of the first part and from part to part.
-    low, high : line → least and greatest value of every part, None where the sensor was lost.
+    start_s, step_s : time of the first bin and bin width.
+    low, high : line → minimum and maximum of every bin, None where the sensor was lost.
     """
 
     lane: SignalLane
@@ -67,23 +67,23 @@ class SignalWindow:
     high: Mapping[str, list[float | None]]
 
 
-def list_lanes(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[SignalLane, ...]:
-    """What can be drawn of an analysis, feet first, then joints from the top, then sensors."""
-    known = reviewed.open(found)
-    return tuple(lane for lane, _ in _lanes(reviewed, found, known))
+def list_lanes(reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord) -> tuple[SignalLane, ...]:
+    """Signals available for an analysis: feet first, then joints from proximal to distal, then sensors."""
+    stored = reviewed.open(record)
+    return tuple(lane for lane, _ in _lanes(reviewed, record, stored))
 
 
 def read_window(
     reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     name: str,
     start_s: float,
     end_s: float,
     points: int,
 ) -> SignalWindow:
-    """A window of a lane in at most `points` parts; raises NotFound for a lane that is not there."""
-    known = reviewed.open(found)
-    drawn = next(((lane, read) for lane, read in _lanes(reviewed, found, known) if lane.name == name), None)
+    """A window of a lane in at most `points` bins; raises NotFound for an unknown lane."""
+    stored = reviewed.open(record)
+    drawn = next(((lane, read) for lane, read in _lanes(reviewed, record, stored) if lane.name == name), None)
     if drawn is None:
         raise NotFound("signal", name)
     lane, read = drawn
@@ -103,55 +103,55 @@ Read = Callable[[], tuple[Floats, Mapping[str, Floats]]]
 
 
 def _lanes(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord, stored: StoredAnalysis
 ) -> Iterator[tuple[SignalLane, Read]]:
-    yield from _foot_lanes(reviewed, found, known)
-    yield from _angle_lanes(known)
-    yield from _raw_lanes(reviewed, found)
+    yield from _foot_lanes(reviewed, record, stored)
+    yield from _angle_lanes(stored)
+    yield from _raw_lanes(reviewed, record)
 
 
 def _foot_lanes(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, known: StoredAnalysis
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord, stored: StoredAnalysis
 ) -> Iterator[tuple[SignalLane, Read]]:
-    tracks = known.tracks
+    tracks = stored.tracks
     if tracks is None:
         return
-    worn = tuple(side for side in SIDES if FOOT[side] in tracks.q)
-    if worn:
+    sides = tuple(side for side in SIDES if FOOT[side] in tracks.q)
+    if sides:
 
         def pitch() -> tuple[Floats, Mapping[str, Floats]]:
             lines: dict[str, Floats] = {}
-            for side in worn:
+            for side in sides:
                 angle = np.degrees(np.arcsin(np.clip(pitch_signal(tracks.q[FOOT[side]]), -1.0, 1.0)))
                 lines[side] = np.where(tracks.valid[FOOT[side]], angle, np.nan)
             return tracks.t_s, lines
 
-        yield SignalLane("foot_pitch", "Foot pitch", "°", "toes up", worn, raw=False), pitch
-    turned = (known.bundle.calibration or {}).get("segments") or {}
-    if worn and file.NAME in found.files and all(FOOT[side] in turned for side in worn):
+        yield SignalLane("foot_pitch", "Foot pitch", "°", "toes up", sides, raw=False), pitch
+    turned = (stored.bundle.calibration or {}).get("segments") or {}
+    if sides and file.NAME in record.files and all(FOOT[side] in turned for side in sides):
 
         def rate() -> tuple[Floats, Mapping[str, Floats]]:
             lines: dict[str, Floats] = {}
             t_s = tracks.t_s
-            for side in worn:
+            for side in sides:
                 mounted = turned[FOOT[side]]
-                t_s, axes = _raw(reviewed, found, FOOT[side], "gyr")
+                t_s, axes = _raw(reviewed, record, FOOT[side], "gyr")
                 bias = np.array([b or 0.0 for b in mounted["gyro_bias_dps"]])
                 # the segment's z axis points to the right: turning about it lifts the toes
-                across = np.array(mounted["R_segment_sensor"])[2]
-                lines[side] = (np.stack([axes[c] for c in AXES], axis=1) - bias) @ across
+                lateral = np.array(mounted["R_segment_sensor"])[2]
+                lines[side] = (np.stack([axes[c] for c in AXES], axis=1) - bias) @ lateral
             return t_s, lines
 
         def strength() -> tuple[Floats, Mapping[str, Floats]]:
             lines: dict[str, Floats] = {}
             t_s = tracks.t_s
-            for side in worn:
-                t_s, axes = _raw(reviewed, found, FOOT[side], "acc")
+            for side in sides:
+                t_s, axes = _raw(reviewed, record, FOOT[side], "acc")
                 lines[side] = np.sqrt(sum(axes[c] ** 2 for c in AXES))
             return t_s, lines
 
-        yield SignalLane("foot_rate", "Foot turning rate", "°/s", "toes rise", worn, raw=False), rate
-        yield SignalLane("foot_acceleration", "Foot acceleration", "m/s²", "more", worn, raw=False), strength
+        yield SignalLane("foot_rate", "Foot turning rate", "°/s", "toes rise", sides, raw=False), rate
+        yield SignalLane("foot_acceleration", "Foot acceleration", "m/s²", "more", sides, raw=False), strength
     feet = tracks.feet
     if feet is not None and feet.p:
         placed = tuple(side for side in SIDES if side in feet.p)
@@ -162,8 +162,8 @@ def _foot_lanes(
         yield SignalLane("foot_height", "Ankle height", "m", "higher", placed, raw=False), height
 
 
-def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
-    angles = known.bundle.angles
+def _angle_lanes(stored: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
+    angles = stored.bundle.angles
     if angles is None:
         return
     for variable in VARIABLES:
@@ -183,18 +183,18 @@ def _angle_lanes(known: StoredAnalysis) -> Iterator[tuple[SignalLane, Read]]:
 
 
 def _raw_lanes(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord
 ) -> Iterator[tuple[SignalLane, Read]]:
-    if file.NAME not in found.files:
+    if file.NAME not in record.files:
         return
-    names = set(_columns(reviewed, found))
+    names = set(_columns(reviewed, record))
     for segment in SEGMENTS:
         for kind, label, unit in (("gyr", "angular rate", "°/s"), ("acc", "acceleration", "m/s²")):
             if f"{segment}_{kind}_x{_ENDING[kind]}" not in names:
                 continue
 
             def read(segment: Segment = segment, kind: str = kind) -> tuple[Floats, Mapping[str, Floats]]:
-                return _raw(reviewed, found, segment, kind)
+                return _raw(reviewed, record, segment, kind)
 
             words = place_words(segment).capitalize()
             yield SignalLane(f"{segment}_{kind}", f"{words}, {label}", unit, "more", AXES, raw=True), read
@@ -203,30 +203,30 @@ def _raw_lanes(
 _ENDING: Final = {"gyr": "_dps", "acc": ""}
 
 
-def _columns(reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord) -> tuple[str, ...]:
+def _columns(reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord) -> tuple[str, ...]:
     def read() -> tuple[str, ...]:
-        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
+        content = analyses.file_bytes(reviewed.blobs, record, file.NAME)
         return tuple(pq.read_schema(BufferReader(content)).names)
 
-    return reviewed.keep_part((found.id, "columns"), read)
+    return reviewed.keep_part((record.id, "columns"), read)
 
 
 def _raw(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, segment: Segment, kind: str
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord, segment: Segment, kind: str
 ) -> tuple[Floats, Mapping[str, Floats]]:
-    """The three axes of a sensor; kept, for whoever looks at a signal looks again."""
+    """The three axes of a sensor, cached as signals are usually viewed repeatedly."""
 
     def read() -> tuple[Floats, Mapping[str, Floats]]:
         names = {c: f"{segment}_{kind}_{c}{_ENDING[kind]}" for c in AXES}
-        content = analyses.file_bytes(reviewed.blobs, found, file.NAME)
+        content = analyses.file_bytes(reviewed.blobs, record, file.NAME)
         table = pq.ParquetFile(BufferReader(content)).read(columns=["t_s", *names.values()])
         return floats_of(table, "t_s"), {c: floats_of(table, name) for c, name in names.items()}
 
-    return reviewed.keep_part((found.id, segment, kind), read)
+    return reviewed.keep_part((record.id, segment, kind), read)
 
 
 def _extremes(values: Floats, size: int) -> tuple[list[float | None], list[float | None]]:
-    """Least and greatest value of successive parts of `size` samples, the last one shorter."""
+    """Minimum and maximum of successive bins of `size` samples; the last one may be shorter."""
     if size == 1:
         same = _plain(values)
         return same, same
@@ -240,7 +240,7 @@ def _extremes(values: Floats, size: int) -> tuple[list[float | None], list[float
 
 def _plain(values: Floats) -> list[float | None]:
     rounded = np.round(values, DIGITS)
-    found: list[float | None] = rounded.tolist()
+    cells: list[float | None] = rounded.tolist()
     for i in np.flatnonzero(~np.isfinite(rounded)):
-        found[i] = None
-    return found
+        cells[i] = None
+    return cells

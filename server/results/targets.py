@@ -1,4 +1,4 @@
-"""Targets of biofeedback in numbers: the norm at a person's speed, the other side, their own baseline."""
+"""Numeric targets of biofeedback: norm at the patient's speed, the other side, or the own baseline."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ FEWEST: Final = 5
 
 @dataclass(frozen=True, eq=False)
 class AnalysedWalk:
-    """An analysed session of a person with what it is compared with.
+    """An analysed session with its norms.
 
     Parameters
     ----------
-    own_controls : the clinic's own norm, read when it is asked for: there may be many controls.
+    own_controls : the clinic's own norm, read on demand as there may be many controls.
     """
 
     session: Session
@@ -48,7 +48,7 @@ class AnalysedWalk:
 
 @dataclass(frozen=True)
 class Offer:
-    """What a source gives, or a sentence that says why it gives nothing."""
+    """Target from a source, or a sentence with the reason why there is none."""
 
     target: Target | None
     reason: str | None = None
@@ -58,28 +58,28 @@ def last_walk(
     c: Connection,
     reviewed: ReviewedAnalyses,
     patient: Patient,
-    before: Session | None = None,
+    reference: Session | None = None,
     session_id: str | None = None,
     *,
     with_controls: bool = True,
 ) -> AnalysedWalk | None:
-    """The analysed walk that says how a person walks, never one with feedback; None without one.
+    """The latest walk without feedback that represents the patient's gait; None without one.
 
-    Without `before` it is that of `histories.baseline`.
+    Without `reference`, as selected by `histories.baseline`.
 
     Parameters
     ----------
-    before : the newest walked like this session, on its day or earlier, itself not. session_id : only this
-        one. with_controls : look for the clinic's own controls too.
+    reference : the newest under the condition of this session, on its day or earlier, excluding itself.
+    session_id : only this one. with_controls : include the clinic's own controls.
     """
-    found = [
+    candidates = [
         a
         for a in histories.list_analysed(c, patient.id)
         if a.session.protocol in WALKS
         and session_id in {None, a.session.id}
-        and (before is None or _earlier(a, before))
+        and (reference is None or _earlier(a, reference))
     ]
-    last = histories.baseline(found)
+    last = histories.baseline(candidates)
     if last is None:
         return None
     numbers = reviewed.read_numbers(last.found, last.edits)
@@ -96,11 +96,11 @@ def last_walk(
 
 
 def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side: Side | None) -> Offer:
-    """What a source gives as target of a parameter, from a person's last walk.
+    """Target of a parameter from a source, based on a patient's last walk.
 
     Parameters
     ----------
-    side : that is to be trained, None = both.
+    side : trained side, None = both.
     """
     if source == "manual":
         return Offer(None, "Enter mean and SD.")
@@ -124,16 +124,16 @@ def opposite_side(side: Side) -> Side:
 
 
 def find_usual_value(walk: AnalysedWalk, parameter: str, side: Side | None) -> Parameter | None:
-    """What a person did in a walk: of a side, or of both together; None where it was not measured."""
-    found = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
-    if found is not None or side is not None:
-        return found
+    """Value of a parameter in a walk, of one side or both together; None if it was not measured."""
+    usual = _mean(walk.numbers, parameter, side) or _mean(walk.numbers, parameter, None)
+    if usual is not None or side is not None:
+        return usual
     sides = [p for s in SIDES if (p := _mean(walk.numbers, parameter, s)) is not None]
     return _together(sides) if sides else None
 
 
 def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
-    """The other side, where the parameter's direction says that it is the better one."""
+    """The other side's value, if it is the better one according to the parameter's direction."""
     entry = CATALOGUE[parameter]
     if entry.better is None:
         return Offer(
@@ -141,13 +141,13 @@ def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
             f"{entry.label}: neither higher nor lower is better by itself. Choose another source, or enter a "
             "target.",
         )
-    other = _own(walk, parameter, opposite_side(side))
+    opposite = _own(walk, parameter, opposite_side(side))
     own = find_usual_value(walk, parameter, side)
-    if other.target is None or other.target.mean is None or own is None or own.mean is None:
-        return other
-    ahead = other.target.mean - own.mean
+    if opposite.target is None or opposite.target.mean is None or own is None or own.mean is None:
+        return opposite
+    ahead = opposite.target.mean - own.mean
     if (ahead if entry.better == "higher" else -ahead) > 0.0:
-        return other
+        return opposite
     return Offer(
         None,
         f"The {side} side is the better one on {day(walk.session.performed_on)}. Train the other side, or "
@@ -158,18 +158,18 @@ def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
 def _norm(walk: AnalysedWalk, parameter: str) -> Offer:
     norms = walk.norms
     values = [norms.expected.get(parameter), norms.values.get(parameter)]
-    found = next((v for v in values if _serves(v)), None)
-    if found is None and (own := walk.own_controls()) is not None and _serves(own.values.get(parameter)):
-        found = own.values[parameter]
-    if found is not None:
-        return Offer(Target("norm", found.mean, found.sd, _words(found), walk.session.id))
+    norm = next((v for v in values if _serves(v)), None)
+    if norm is None and (own := walk.own_controls()) is not None and _serves(own.values.get(parameter)):
+        norm = own.values[parameter]
+    if norm is not None:
+        return Offer(Target("norm", norm.mean, norm.sd, _words(norm), walk.session.id))
     reason = norms.reason if is_angle(parameter) else norms.timing_reason
     if reason is not None:
-        said = NO_NORM.get(reason, reason)
+        text = NO_NORM.get(reason, reason)
     else:
-        there = next((v for v in values if v is not None), None)
-        said = "There is no norm of this parameter." if there is None else there.note
-    return Offer(None, f"{said} Choose another source, or enter a target.")
+        norm_value = next((v for v in values if v is not None), None)
+        text = "There is no norm of this parameter." if norm_value is None else norm_value.note
+    return Offer(None, f"{text} Choose another source, or enter a target.")
 
 
 def _serves(value: NormValue | None) -> bool:
@@ -177,19 +177,19 @@ def _serves(value: NormValue | None) -> bool:
 
 
 def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
-    found = find_usual_value(walk, parameter, side)
-    where = "both sides" if side is None else f"{side} side"
-    if found is None or found.mean is None or not found.sd or found.n < FEWEST:
-        n = 0 if found is None else found.n
+    usual = find_usual_value(walk, parameter, side)
+    label = "both sides" if side is None else f"{side} side"
+    if usual is None or usual.mean is None or not usual.sd or usual.n < FEWEST:
+        n = 0 if usual is None else usual.n
         return Offer(
             None,
-            f"The {where} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
+            f"The {label} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
             f"{day(walk.session.performed_on)}; expected at least {FEWEST} that differ. Choose another "
             "source, or enter a target.",
         )
-    words = f"{where}, {found.n} {plural(found.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
+    words = f"{label}, {usual.n} {plural(usual.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
     source: TargetSource = "own_baseline"
-    return Offer(Target(source, found.mean, found.sd, words, walk.session.id))
+    return Offer(Target(source, usual.mean, usual.sd, words, walk.session.id))
 
 
 def _words(value: NormValue) -> str:
@@ -205,7 +205,7 @@ def _mean(numbers: Numbers, name: str, side: Side | None) -> Parameter | None:
 
 
 def _together(sides: list[Parameter]) -> Parameter:
-    """Strides of all sides as one: mean, and sd about it."""
+    """Mean and sd over the strides of all sides."""
     n = sum(p.n for p in sides)
     mean = sum(p.n * (p.mean or 0.0) for p in sides) / n
     squares = sum((p.n - 1) * (p.sd or 0.0) ** 2 + p.n * ((p.mean or 0.0) - mean) ** 2 for p in sides)
@@ -214,7 +214,7 @@ def _together(sides: list[Parameter]) -> Parameter:
 
 
 def _earlier(a: AnalysedSession, b: Session) -> bool:
-    """Whether a visit came before this session and was walked like it; how fast its belt will run is open."""
+    """Whether a visit precedes this session under the same condition, except for treadmill speed."""
     own = a.session
     if own.id == b.id or (own.performed_on, own.created_at) >= (b.performed_on, b.created_at):
         return False

@@ -1,7 +1,7 @@
-"""Tunings: gains of a filter fitted to trials of a session, by command line and worker alike.
+"""Tunings: filter gains fitted to trials of a session, by command line and worker alike.
 
-The trials are files of the session's recording (.npz, docs/science/filters.md). One tuning takes minutes to
-hours: it leaves a checkpoint after every iteration and goes on from it (server/worker/task.py).
+Trials are files of the session's recording (.npz, docs/science/filters.md). One tuning takes minutes to
+hours: it stores a checkpoint after every iteration and resumes from it (server/worker/task.py).
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ SWARM: Final = ("particles", "iterations", "rounds", "random_rounds")
 
 @dataclass(frozen=True)
 class TuningOrder:
-    """What is to be tuned.
+    """Parameters of a tuning.
 
     Parameters
     ----------
-    validation : names of the trials that only judge. scheme : how gains follow the motion, None = as by
-    default. magnetometer : None = where the algorithm can. particles … random_rounds : of the swarm, None =
+    validation : names of validation trials. scheme : adaptation of gains to the motion, None = default.
+    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None =
     as in the thesis.
     """
 
@@ -69,7 +69,7 @@ class TuningOrder:
 
 @dataclass(frozen=True)
 class StoredTuning:
-    """A finished tuning: what went in, by what version, and what came out.
+    """A finished tuning: inputs, version and result.
 
     See sagittal.core.fusion.algorithms.tuning.
     """
@@ -85,11 +85,12 @@ class StoredTuning:
 
 
 def prepare(files: Sequence[SourceFile], order: TuningOrder) -> GainTuner:
-    """Read the trials among the files and check everything before the long search.
+    """Read the trials among the files and validate everything before the long search.
 
     Raises
     ------
-    SagittalError : trials cannot be read or split, no such algorithm; the sentence says what to do.
+    SagittalError : trials cannot be read or split, or the algorithm is unknown; the message contains a
+        remedy.
     """
     from sagittal.core.fusion.algorithms.benchmark import read_trial
     from sagittal.core.fusion.algorithms.swarm import SwarmRules
@@ -109,17 +110,17 @@ def prepare(files: Sequence[SourceFile], order: TuningOrder) -> GainTuner:
 
 
 def search(tuner: GainTuner, keep: Keep, swarm: Swarm | None) -> TuningResult:
-    """Search with a thread on every core, each behind everything else that wants one."""
+    """Search with one thread per core, each at low priority."""
     with ThreadPoolExecutor(os.cpu_count(), initializer=os.nice, initargs=(BEHIND,)) as pool:
         return tuner.run(keep, swarm, pool.map)
 
 
 def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
-    """Tune, going on from what an earlier attempt of this version left; the result as JSON.
+    """Tune, resuming from a checkpoint of the same version; return the result as JSON.
 
     Parameters
     ----------
-    params : of the job, its `order` as members of TuningOrder.
+    params : of the job, with `order` as fields of TuningOrder.
 
     Raises
     ------
@@ -136,18 +137,18 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
         attempt.keep(content)
         attempt.progress("searching", share, message)
 
-    found = search(tuner, keep, swarm).to_json()
-    return {RESULT: json.dumps(found, ensure_ascii=False, allow_nan=False).encode()}
+    result = search(tuner, keep, swarm).to_json()
+    return {RESULT: json.dumps(result, ensure_ascii=False, allow_nan=False).encode()}
 
 
 def submit(
     c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str, order: TuningOrder
 ) -> JobView:
-    """Ask for a tuning on the trials of the current recording; the same one is done once.
+    """Request a tuning on the trials of the current recording; idempotent.
 
     Raises
     ------
-    Conflict : no_files, no_such_trial. NotFound : the session. ParameterError : of `require_tunable`.
+    Conflict : no_files, no_such_trial. NotFound : the session. ParameterError : see `require_tunable`.
     """
     require_tunable(order.algorithm)
     this = recordings.require_current(c, session_id)
@@ -169,7 +170,7 @@ def submit(
 
 
 def publish(c: Connection, claim: Claim, files: Mapping[str, bytes], stored: Mapping[str, Blob]) -> None:
-    """Write the row of a result, in the transaction that marks its job done."""
+    """Store the row of a result, in the transaction that marks its job done."""
     row = {
         "id": new_id(),
         "recording_id": claim.recording_id,
@@ -191,7 +192,7 @@ def get(c: Connection, tuning_id: str) -> StoredTuning:
 
 
 def of_session(c: Connection, session_id: str) -> list[StoredTuning]:
-    """The finished tunings of a session, the newest first; raises NotFound for the session."""
+    """Finished tunings of a session, newest first; raises NotFound for the session."""
     sessions.get(c, session_id)
     rows = c.execute(
         _QUERY.where(recording.c.session_id == session_id).order_by(tuning.c.created_at.desc(), tuning.c.id)

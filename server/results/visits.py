@@ -1,4 +1,4 @@
-"""Visits: what was recorded on one day under one condition, as one or several takes, and their mean."""
+"""Visits: the trials of one day under one condition, and their mean."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ SPEED: Final = "gait_speed_mps"
 
 @dataclass(frozen=True, eq=False)
 class ClinicVisit:
-    """The analysed takes of one day that were walked alike, in the order they were made; at least one."""
+    """The analysed trials of one day under the same condition, in order of recording; at least one."""
 
     takes: tuple[AnalysedSession, ...]
 
     @property
     def day(self) -> dt.date:
-        """When it was."""
+        """Date of the visit."""
         return self.takes[0].session.performed_on
 
     @property
     def condition(self) -> WalkingCondition:
-        """How all its takes were walked."""
+        """Walking condition of all its trials."""
         return self.takes[0].condition
 
 
 @dataclass(frozen=True)
 class TakesFigure:
-    """A figure of a visit.
+    """A parameter of a visit.
 
     Parameters
     ----------
-    by_take : session of every take that has the parameter → it. mean : over them.
+    by_take : session of every trial with a value → value. mean : over them.
     """
 
     by_take: Mapping[str, Parameter]
@@ -54,20 +54,20 @@ class TakesFigure:
 
     @property
     def takes(self) -> tuple[Parameter, ...]:
-        """Of the takes, in the order they were made."""
+        """Values of the trials, in order of recording."""
         return tuple(self.by_take.values())
 
 
 @dataclass(frozen=True)
 class NewestSpeed:
-    """Walking speed of a patient's newest visit; its change since the visit before, None = none yet."""
+    """Gait speed at a patient's newest visit, and its change since the previous visit, None = none yet."""
 
     mean: Parameter
     change: Change | None
 
 
 def group_takes(done: Sequence[AnalysedSession]) -> list[ClinicVisit]:
-    """Join takes of one day that were walked alike; visits and takes oldest first."""
+    """Group trials of one day under the same condition; visits and trials oldest first."""
     groups: list[list[AnalysedSession]] = []
     for a in sorted(done, key=lambda a: (a.session.performed_on, a.session.created_at)):
         same = next((g for g in reversed(groups) if is_one_visit(g[0], a)), None)
@@ -79,7 +79,7 @@ def group_takes(done: Sequence[AnalysedSession]) -> list[ClinicVisit]:
 
 
 def is_one_visit(a: AnalysedSession, b: AnalysedSession) -> bool:
-    """Whether two takes belong together: same day, walked alike, both with feedback or both without."""
+    """Whether two trials belong to the same visit: same day and condition, both with or without feedback."""
     return (
         a.session.performed_on == b.session.performed_on
         and a.session.feedback == b.session.feedback
@@ -88,7 +88,7 @@ def is_one_visit(a: AnalysedSession, b: AnalysedSession) -> bool:
 
 
 def find_visit_of(done: Sequence[AnalysedSession], session_id: str) -> ClinicVisit | None:
-    """The visit a session is a take of; None when it is not analysed."""
+    """The visit that includes a session; None if it is not analysed."""
     return next(
         (v for v in group_takes(done) if any(t.session.id == session_id for t in v.takes)),
         None,
@@ -98,24 +98,26 @@ def find_visit_of(done: Sequence[AnalysedSession], session_id: str) -> ClinicVis
 def measure_visit(
     reviewed: ReviewedAnalyses, visit: ClinicVisit
 ) -> Mapping[tuple[str, Side | None], TakesFigure]:
-    """Every parameter of a visit by name and side; raises IntegrityError."""
-    by: dict[tuple[str, Side | None], dict[str, Parameter]] = {}
+    """All parameters of a visit by name and side; raises IntegrityError."""
+    by_parameter: dict[tuple[str, Side | None], dict[str, Parameter]] = {}
     for take in visit.takes:
         for p in reviewed.read_numbers(take.found, take.edits).parameters:
-            by.setdefault((p.name, p.side), {})[take.session.id] = p
-    return {key: TakesFigure(found, join_takes(list(found.values()))) for key, found in by.items()}
+            by_parameter.setdefault((p.name, p.side), {})[take.session.id] = p
+    return {
+        key: TakesFigure(by_take, join_takes(list(by_take.values()))) for key, by_take in by_parameter.items()
+    }
 
 
 def find_before(
     visits: Sequence[ClinicVisit], visit: ClinicVisit, planned: Mapping[str, VisitKind]
 ) -> ClinicVisit | None:
-    """The visit that another one is compared with: the last earlier day in the same condition.
+    """The visit used for comparison: the last on an earlier day under the same condition.
 
-    Of an assessment the last assessment, so that a single training does not stand for the course.
+    For an assessment it is the last assessment, so that a single training does not influence the trend.
 
     Parameters
     ----------
-    visits : oldest first. planned : session → kind of the planned visit it was.
+    visits : oldest first. planned : session → kind of its planned visit.
     """
     is_assessment = _is_assessment(visit, planned)
     for v in reversed(visits):
@@ -134,7 +136,7 @@ def _is_assessment(visit: ClinicVisit, planned: Mapping[str, VisitKind]) -> bool
 def choose_newest_walks(
     c: Connection, patient_ids: Collection[str], planned: Mapping[str, VisitKind]
 ) -> dict[str, list[sessions.WalkedSession]]:
-    """Takes of each patient's newest visit and of the one that it is compared with, in one statement for all.
+    """Trials of each patient's newest visit and the one before, in a single statement for all.
 
     Parameters
     ----------
@@ -153,40 +155,39 @@ def choose_newest_walks(
 def read_newest_speeds(
     reviewed: ReviewedAnalyses,
     chosen: Mapping[str, Sequence[sessions.WalkedSession]],
-    shown: Mapping[str, analyses.AnalysisRecord],
+    records: Mapping[str, analyses.AnalysisRecord],
     edits: Mapping[str, edit_log.EditHistory],
 ) -> dict[str, NewestSpeed]:
-    """Walking speed of the newest visit of each patient; what cannot be read is left out.
+    """Gait speed at the newest visit of each patient; unreadable ones are omitted.
 
     Parameters
     ----------
-    chosen : what `choose_newest_walks` chose.
-    shown : the results that count, by session.
+    chosen : result of `choose_newest_walks`. records : displayed analyses, by session.
     edits : by analysis.
     """
     speeds = {}
     for pid, walks in chosen.items():
         days: dict[dt.date, list[Parameter]] = {}
         for w in walks:
-            found = shown[w.id]
-            speed = _read_speed(reviewed, found, edits[found.id])
+            record = records[w.id]
+            speed = _read_speed(reviewed, record, edits[record.id])
             if speed is not None:
                 days.setdefault(w.performed_on, []).append(speed)
-        made = [join_takes(days[day]) for day in sorted(days)]
-        if made and max(days) == walks[0].performed_on and made[-1].mean is not None:
-            before = made[0] if len(made) > 1 else None
-            change = None if before is None else parameter_changes([before], [made[-1]])[0]
-            speeds[pid] = NewestSpeed(made[-1], change)
+        daily_means = [join_takes(days[day]) for day in sorted(days)]
+        if daily_means and max(days) == walks[0].performed_on and daily_means[-1].mean is not None:
+            previous = daily_means[0] if len(daily_means) > 1 else None
+            change = None if previous is None else parameter_changes([previous], [daily_means[-1]])[0]
+            speeds[pid] = NewestSpeed(daily_means[-1], change)
     return speeds
 
 
 def _read_speed(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory
+    reviewed: ReviewedAnalyses, record: analyses.AnalysisRecord, edits: edit_log.EditHistory
 ) -> Parameter | None:
-    if "analysis.json" not in found.files:
+    if "analysis.json" not in record.files:
         return None
     try:
-        return reviewed.read_speed(found, edits)
+        return reviewed.read_speed(record, edits)
     except UNREADABLE:
         return None
 
@@ -194,7 +195,7 @@ def _read_speed(
 def _two_days(
     mine: Sequence[sessions.WalkedSession], newest: sessions.WalkedSession, planned: Mapping[str, VisitKind]
 ) -> list[sessions.WalkedSession]:
-    """The takes of a visit and of the one before it, newest first."""
+    """Trials of a visit and the one before, newest first."""
     alike = [w for w in mine if is_alike(w.condition, newest.condition)]
     is_training = planned.get(newest.id) == "training"
     earlier = [

@@ -1,1 +1,1 @@
-"""Backup, restore, erasure, and checks that what is stored is still there."""
+"""Backup, restore, erasure, and integrity checks of stored data."""

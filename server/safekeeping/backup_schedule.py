@@ -1,7 +1,7 @@
-"""Backups by the clock, and the weekly proof that the newest one can be restored.
+"""Scheduled backups, and a weekly restore test of the newest one.
 
-if is_due(settings, now()): run(settings)      # in a process of its own (worker/backing_up.py)
-read_state(settings)                           # how the last ones went: the page System, health, metrics
+if is_due(settings, now()): run(settings)      # in a separate process (worker/backing_up.py)
+read_state(settings)                           # last outcomes, for the System page, health and metrics
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ CLOSED: Final = "Patients' names in it need their key, which is not in it or is 
 
 @dataclass(frozen=True)
 class Outcome:
-    """How one backup or one restore test went.
+    """Outcome of one backup or restore test.
 
     Parameters
     ----------
-    at : when it ended. ok : None = it could not be tried. name : the backup's file.
-    said : what went wrong, or what was found, as a sentence. size : bytes of the backup, 0 = none.
+    at : end time. ok : None = it could not be attempted. name : the backup's file.
+    said : error or findings, as a sentence. size : bytes of the backup, 0 = none.
     """
 
     at: dt.datetime
@@ -66,11 +66,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class BackupState:
-    """How the last backup and the last restore test went; None = there was none.
+    """Outcome of the last backup and restore test; None = there was none.
 
     Parameters
     ----------
-    good : the last backup that was made without a complaint.
+    good : the last backup without errors.
     """
 
     backup: Outcome | None = None
@@ -79,7 +79,7 @@ class BackupState:
 
 
 def read_state(settings: Settings) -> BackupState:
-    """What the file says; empty when there is none or it cannot be read."""
+    """Read the state file; empty if missing or unreadable."""
     try:
         tree: Any = read_json(settings.backup_state.read_bytes())
         return BackupState(*(_parse(tree[name]) for name in ("backup", "good", "test")))
@@ -90,31 +90,33 @@ def read_state(settings: Settings) -> BackupState:
         return BackupState()
 
 
-def next_time(settings: Settings, at: dt.datetime) -> dt.datetime:
-    """When the clock next shows `backup_at`, in the zone of `at`."""
+def next_time(settings: Settings, time: dt.datetime) -> dt.datetime:
+    """Next occurrence of `backup_at`, in the time zone of `time`."""
     hour, minute = map(int, settings.backup_at.split(":"))
-    day = at.replace(hour=hour, minute=minute, second=0, microsecond=0)
-    return day if day > at else day + dt.timedelta(days=1)
+    day = time.replace(hour=hour, minute=minute, second=0, microsecond=0)
+    return day if day > time else day + dt.timedelta(days=1)
 
 
-def is_due(settings: Settings, at: dt.datetime) -> bool:
-    """Whether a backup is to be made: none since the last `backup_at`, no failure within the hour.
+def is_due(settings: Settings, time: dt.datetime) -> bool:
+    """Whether a backup is due: none since the last `backup_at`, and no failure within the hour.
 
     Parameters
     ----------
-    at : the time in the machine's zone.
+    time : local time.
     """
     if not settings.backup_dir:
         return False
     state = read_state(settings)
-    if state.backup is not None and not state.backup.ok and at - state.backup.at < TRY_AGAIN:
+    if state.backup is not None and not state.backup.ok and time - state.backup.at < TRY_AGAIN:
         return False
-    last = next_time(settings, at) - dt.timedelta(days=1)
+    last = next_time(settings, time) - dt.timedelta(days=1)
     return state.good is None or state.good.at < last
 
 
 def run(settings: Settings) -> BackupState:
-    """Make a backup, remove old ones, test the newest when the last test is a week old; write how it went."""
+    """Make a backup, prune old ones, test the newest if the last test is a week old, and store the
+    outcome.
+    """
     folder = Path(settings.backup_dir)
     state = read_state(settings)
     key: ClinicKey | None = None
@@ -122,14 +124,14 @@ def run(settings: Settings) -> BackupState:
         require_current(settings.database_source)
         key = read_key(Path(settings.backup_key)) if settings.backup_key else None
         with closing(Database(settings.database_source)) as db:
-            made = make_backup(db, settings, folder, key)
+            new_backup = make_backup(db, settings, folder, key)
         prune(folder)
-        said = ""
-        if made.left_out is not None:
-            said = LEFT_OUT
-        if made.missing:
-            said = f"{len(made.missing)} stored files are gone or damaged; see sagittal check."
-        backup = Outcome(now(), not made.missing, made.path.name, said, made.size)
+        message = ""
+        if new_backup.left_out is not None:
+            message = LEFT_OUT
+        if new_backup.missing:
+            message = f"{len(new_backup.missing)} stored files are gone or damaged; see sagittal check."
+        backup = Outcome(now(), not new_backup.missing, new_backup.path.name, message, new_backup.size)
     except (BackupFileError, BackupError, MigrationError, TombstoneError, OSError) as error:
         log.error("no backup was made: %s", error)
         backup = Outcome(now(), False, "", str(error))
@@ -151,22 +153,22 @@ def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
     if key is not None and not key.opens:
         return Outcome(now(), None, newest.name, NOT_TESTED)
     try:
-        found = try_restore(newest, settings, key)
+        restored = try_restore(newest, settings, key)
     except (BackupFileError, RestoreError, TombstoneError) as error:
         log.error("the newest backup could not be restored: %s", error)
         return Outcome(now(), False, newest.name, str(error))
-    said = f"{found.patients} patients, {found.sessions} visits, {found.files} files."
-    if found.names_open:
-        return Outcome(now(), True, newest.name, said)
+    message = f"{restored.patients} patients, {restored.sessions} visits, {restored.files} files."
+    if restored.names_open:
+        return Outcome(now(), True, newest.name, message)
     # what is not encrypted never holds the key; what is should
-    return Outcome(now(), key is None, newest.name, f"{said} {CLOSED}")
+    return Outcome(now(), key is None, newest.name, f"{message} {CLOSED}")
 
 
 def _parse(tree: Any) -> Outcome | None:
     if tree is None:
         return None
-    at = dt.datetime.fromisoformat(tree["at"])
-    return Outcome(at, tree["ok"], tree["name"], tree["said"], tree["size"])
+    time = dt.datetime.fromisoformat(tree["at"])
+    return Outcome(time, tree["ok"], tree["name"], tree["said"], tree["size"])
 
 
 def _write(settings: Settings, state: BackupState) -> BackupState:

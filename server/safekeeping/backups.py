@@ -1,11 +1,11 @@
-"""A backup while the service runs: one file with the database, stored files, live logs and a manifest.
+"""Online backups: one file with the database, stored files, live logs and a manifest.
 
-    made = make_backup(db, settings, Path("/mnt/backup"), key)     # an existing folder: the name says when
-    prune(Path("/mnt/backup"))                                     # keep days, weeks and months
+    made = make_backup(db, settings, Path("/mnt/backup"), key)     # an existing folder: named by time
+    prune(Path("/mnt/backup"))                                     # retain daily, weekly and monthly ones
 
-Live logs go first, then a snapshot of the database, then the files it refers to. So a take that ends
-meanwhile is there as a log or as a recording; stored files never change, one that is swept meanwhile is in
-the trash. The file appears under its name when it is whole and on the disk, or not at all.
+Live logs are read first, then a snapshot of the database, then the files it refers to. A trial that ends
+meanwhile is thus included as a log or as a recording; stored files never change, and one that is swept
+meanwhile is in the trash. The file appears under its name only when complete and on disk.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ _OLD_S: Final = 86_400.0
 
 
 class BackupError(Exception):
-    """No backup was made; the message says why and what to do."""
+    """The backup failed; the message gives reason and remedy."""
 
 
 @dataclass(frozen=True)
 class Backup:
-    """A backup in a folder: its file, when it was begun, its length in bytes."""
+    """A backup in a folder: path, start time, size in bytes."""
 
     path: Path
     at: dt.datetime
@@ -73,14 +73,14 @@ class Backup:
 
 @dataclass(frozen=True)
 class MadeBackup:
-    """A backup that was made.
+    """A completed backup.
 
     Parameters
     ----------
-    path, size : the file, bytes. files : how many stored files and live logs are in it.
+    path, size : the file, bytes. files : number of stored files and live logs in it.
     head : newest audit row.
-    missing : (space, sha256) of files that the database refers to and that are gone or damaged, so not in it.
-    left_out : the key of patients' names, where it is not in it: not encrypted, or the key cannot be read.
+    missing : (space, sha256) of referenced files that are missing or damaged and thus not included.
+    left_out : the identity key, if not included: the backup is not encrypted, or the key cannot be read.
     """
 
     path: Path
@@ -93,7 +93,7 @@ class MadeBackup:
 
 @dataclass
 class _Content:
-    """What has been put into an archive: name, size and sha256 of each file, and what should have been."""
+    """Content of an archive: name, size and sha256 of each file, and missing files."""
 
     files: list[tuple[str, int, str]] = field(default_factory=list)
     missing: list[tuple[str, str]] = field(default_factory=list)
@@ -102,17 +102,17 @@ class _Content:
 def make_backup(
     db: Database, settings: Settings, target: Path, key: ClinicKey | None, actor: audit.Actor | None = None
 ) -> MadeBackup:
-    """Make one backup; a target that does not end as a file of ours is a folder: the name says when.
+    """Make one backup; a target without the extension of a backup is a folder, and the file is named by time.
 
     Raises
     ------
     BackupError
-        another one is being made, or the target cannot be written.
+        another backup is in progress, or the target cannot be written.
     """
-    at = now()
+    time = now()
     is_file = target.name.endswith(ENDS)
     folder = target.parent if is_file else target
-    path = target if is_file else target / _name(at, key)
+    path = target if is_file else target / _name(time, key)
     if not folder.is_dir():
         raise BackupError(f"There is no folder {folder}. Make it, or connect the disk, and try again.")
     if path.is_relative_to(settings.data_dir):
@@ -125,7 +125,7 @@ def make_backup(
         try:
             _clear(settings.backups, 0.0)
             _clear(folder, _OLD_S)
-            made = _write(db, settings, path, key, at)
+            backup = _write(db, settings, path, key, time)
             with db.read() as c:
                 keep_tombstones(find_tombstones(c), folder)
         finally:
@@ -137,44 +137,44 @@ def make_backup(
     except StoreAway as error:
         raise BackupError(f"The stored files cannot be read ({error.detail}); no backup was made.") from error
     with db.write() as c:
-        detail = {"files": made.files, "size": made.size, "missing": len(made.missing)}
+        detail = {"files": backup.files, "size": backup.size, "missing": len(backup.missing)}
         audit.record(c, actor, "backup.made", "database", None, detail)
-    return made
+    return backup
 
 
 def list_backups(folder: Path) -> list[Backup]:
-    """The backups in a folder, the newest first; other files are passed over."""
-    found = []
+    """Backups in a folder, newest first; other files are ignored."""
+    backups = []
     for path in folder.iterdir() if folder.is_dir() else ():
         named = _NAME.fullmatch(path.name)
         with contextlib.suppress(ValueError, FileNotFoundError):
             if named is not None:
-                at = dt.datetime.strptime(named[1], _STAMP).replace(tzinfo=dt.UTC)
-                found.append(Backup(path, at, path.stat().st_size))
-    return sorted(found, key=lambda one: one.at, reverse=True)
+                time = dt.datetime.strptime(named[1], _STAMP).replace(tzinfo=dt.UTC)
+                backups.append(Backup(path, time, path.stat().st_size))
+    return sorted(backups, key=lambda one: one.at, reverse=True)
 
 
 def choose_kept(times: Iterable[dt.datetime]) -> set[dt.datetime]:
-    """Which backups are kept: of the last days, weeks and months that have any, the newest of each."""
+    """Backups to retain: the newest of each of the last days, weeks and months that have any."""
     newest_first = sorted(times, reverse=True)
-    kept: set[dt.datetime] = set()
+    retained: set[dt.datetime] = set()
     for most, period in (
         (DAYS, lambda t: t.date()),
         (WEEKS, lambda t: t.isocalendar()[:2]),
         (MONTHS, lambda t: (t.year, t.month)),
     ):
         first: dict[object, dt.datetime] = {}
-        for at in newest_first:
-            first.setdefault(period(at), at)
-        kept |= set(list(first.values())[:most])
-    return kept
+        for moment in newest_first:
+            first.setdefault(period(moment), moment)
+        retained |= set(list(first.values())[:most])
+    return retained
 
 
 def prune(folder: Path) -> list[Path]:
-    """Remove the backups of a folder that `choose_kept` does not name; return which."""
-    found = list_backups(folder)
-    kept = choose_kept(one.at for one in found)
-    gone = [one.path for one in found if one.at not in kept]
+    """Remove the backups of a folder not selected by `choose_kept`; return their names."""
+    backups = list_backups(folder)
+    retained = choose_kept(one.at for one in backups)
+    gone = [one.path for one in backups if one.at not in retained]
     for path in gone:
         fs.remove_file(path)
     if gone:
@@ -183,13 +183,13 @@ def prune(folder: Path) -> list[Path]:
 
 
 def count_patients_and_sessions(c: Connection) -> tuple[int, int]:
-    """How many patients and sessions there are."""
+    """Numbers of patients and sessions."""
     people = c.execute(select(func.count()).select_from(patient)).scalar_one()
     return people, c.execute(select(func.count()).select_from(session)).scalar_one()
 
 
 def _write(
-    db: Database, settings: Settings, path: Path, key: ClinicKey | None, at: dt.datetime
+    db: Database, settings: Settings, path: Path, key: ClinicKey | None, time: dt.datetime
 ) -> MadeBackup:
     content = _Content()
     with fs.IncomingFile(path.parent) as file:
@@ -214,7 +214,7 @@ def _write(
             left_out = _add_names_key(archive, settings, content, encrypted=key is not None)
             manifest = {
                 "format": FORMAT,
-                "created_at": at.isoformat(),
+                "created_at": time.isoformat(),
                 "code_version": CODE_VERSION,
                 "revision": revision,
                 "audit_head": None if head is None else {"seq": head.seq, "hash": head.hash},
@@ -232,7 +232,7 @@ def _write(
 
 @contextlib.contextmanager
 def _snapshot(db: Database, settings: Settings) -> Iterator[Path]:
-    """A consistent copy of the database for as long as the block lasts."""
+    """Context with a consistent copy of the database."""
     copy = settings.backups / f"{new_id()}.tmp"
     try:
         fs.keep_private(copy)
@@ -258,7 +258,7 @@ def _add_open(archive: ArchiveWriter, name: str, source: BinaryIO, content: _Con
 def _add_names_key(
     archive: ArchiveWriter, settings: Settings, content: _Content, *, encrypted: bool
 ) -> Path | None:
-    """Add the key of patients' names where it is safe; returns its file where it was left out."""
+    """Add the identity key if the backup is encrypted; return its path if it was omitted."""
     file = settings.identity_key_file
     try:
         with file.open("rb") as source:
@@ -292,18 +292,18 @@ def _add_blobs(
             continue
         with source:
             _add_open(archive, f"blobs/{space}/{sha256}", source, content)
-        name, _, found = content.files[-1]
-        if found != sha256:
+        name, _, digest = content.files[-1]
+        if digest != sha256:
             # its bytes stay in the archive for whoever can mend them; a restore takes it for what it is
             log.error("%s has changed on the disk; see `sagittal check`", name)
             content.missing.append((space, sha256))
 
 
 def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
-    """A file in its place, or in the trash since the snapshot; None = it is in neither."""
-    found = blobs.open_unverified(space, sha256)
-    if found is not None:
-        return found
+    """Open a stored file, or its copy in the trash since the snapshot; None = neither exists."""
+    file = blobs.open_unverified(space, sha256)
+    if file is not None:
+        return file
     for one in blobs.trash.files():
         if (one.space, one.name) == (space, sha256):
             with contextlib.suppress(FileNotFoundError):
@@ -312,7 +312,7 @@ def _open(blobs: BlobStore, space: str, sha256: str) -> BinaryIO | None:
 
 
 def _clear(folder: Path, least_age_s: float) -> None:
-    """Remove what backups that were killed have left."""
+    """Remove the remains of killed backups."""
     for path in folder.iterdir():
         stem = path.name.removesuffix("-wal").removesuffix("-shm")
         with contextlib.suppress(FileNotFoundError):
@@ -320,5 +320,5 @@ def _clear(folder: Path, least_age_s: float) -> None:
                 fs.remove_file(path)
 
 
-def _name(at: dt.datetime, key: ClinicKey | None) -> str:
-    return f"sagittal-{at:{_STAMP}}.tar{'' if key is None else '.age'}"
+def _name(time: dt.datetime, key: ClinicKey | None) -> str:
+    return f"sagittal-{time:{_STAMP}}.tar{'' if key is None else '.age'}"

@@ -1,4 +1,4 @@
-"""`sagittal check`: is everything that is stored still what was stored?"""
+"""Integrity checks of `sagittal check`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from sagittal.server.storage.references import list_referenced
 
 @dataclass(frozen=True)
 class StorageDefect:
-    """One thing that is wrong.
+    """One defect.
 
     Parameters
     ----------
-    area : database, files, live, trash, audit, or keys: what cannot be read by its key.
-    message : what, and where.
+    area : database, files, live, trash, audit, or keys (values that cannot be decrypted).
+    message : description and location.
     """
 
     area: str
@@ -44,43 +44,43 @@ def check(
     known_missing: Collection[tuple[str, str]] = (),
     kept_head: Path | None = None,
 ) -> list[StorageDefect]:
-    """Check database, stored files by their hash, live logs, trash, audit chain and what is encrypted.
+    """Check database, hashes of stored files, live logs, trash, audit chain and encrypted values.
 
     Parameters
     ----------
-    known_missing : files (space, sha256) of which it is known already that they are not there.
-    kept_head : a file like `audit.mark` that was kept elsewhere: the log must still hold that row.
+    known_missing : files (space, sha256) known to be missing.
+    kept_head : a copy of `audit.mark` stored elsewhere: the log must still contain that row.
 
     Raises
     ------
     StoreAway
-        the stored files cannot be looked at now.
+        the stored files are unavailable.
     """
     try:
-        found = [StorageDefect("database", text) for text in db.problems()]
+        defects = [StorageDefect("database", text) for text in db.problems()]
         with db.read() as c:
             used = sorted(list_referenced(c))
-            found += [StorageDefect("audit", text) for text in audit.find_problems(c)]
+            defects += [StorageDefect("audit", text) for text in audit.find_problems(c)]
             cut = None if kept_head is None else explain_lost_rows(c, kept_head)
             doubted = custody.find_doubt(c, settings)
             unread = [
                 *identities.find_problems(c, settings.identity_key_file),
                 *second_factor.find_problems(c, settings.second_factor_key),
             ]
-            found += [StorageDefect("keys", text) for text in unread]
+            defects += [StorageDefect("keys", text) for text in unread]
     except DatabaseError as error:
         return [StorageDefect("database", f"cannot be read ({error.orig}); restore it from a backup")]
     if doubted is not None:
         text = f"{doubted} No stored file is taken away until the right one is back or `sagittal accept`."
-        found.append(StorageDefect("audit", text))
+        defects.append(StorageDefect("audit", text))
     if kept_head is not None and not kept_head.is_file():
         cut = f"There is no file {kept_head}, so nobody knows whether the audit log is whole."
     if cut is not None:
-        found.append(StorageDefect("audit", cut))
+        defects.append(StorageDefect("audit", cut))
     trash = list(blobs.trash.files())
     waiting = {(one.space, one.name) for one in trash}
     return [
-        *found,
+        *defects,
         *_check_files(blobs, [one for one in used if one not in known_missing], waiting),
         *_check_live(db, settings),
         *(f for one in trash for f in _check_discarded(blobs.trash, one)),
@@ -90,7 +90,7 @@ def check(
 def _check_files(
     blobs: BlobStore, used: Sequence[tuple[str, str]], waiting: Collection[tuple[str, str]]
 ) -> Iterator[StorageDefect]:
-    """Open every file that is in use, by its hash; those that are `waiting` lie in the trash."""
+    """Open every referenced file and verify its hash; those in `waiting` are in the trash."""
     for space, sha256 in used:
         try:
             blobs.open(space, sha256).close()
@@ -106,18 +106,18 @@ def _check_files(
 
 
 def _check_live(db: Database, settings: Settings) -> list[StorageDefect]:
-    found = []
+    defects = []
     with db.read() as c:
         for log in live_logs.list_logs(c, settings):
             if not log.known:
                 text = f"the database knows nothing of {log.path.name} ({log.words}); see `sagittal adopt`."
-                found.append(StorageDefect("live", text))
+                defects.append(StorageDefect("live", text))
             if log.damage is not None:
-                found.append(StorageDefect("live", f"{log.path.name}: {log.damage.sentence}"))
+                defects.append(StorageDefect("live", f"{log.path.name}: {log.damage.sentence}"))
     for path in live_logs.list_originals(settings):
         text = f"{path.name} is the original of a damaged log; remove it when nobody needs it any more."
-        found.append(StorageDefect("live", text))
-    return found
+        defects.append(StorageDefect("live", text))
+    return defects
 
 
 def _check_discarded(trash: Trash, one: TrashedFile) -> list[StorageDefect]:

@@ -1,8 +1,8 @@
-"""Whether this database may say which stored files are needed; not after it was emptied or put back.
+"""Guard against deleting stored files on the evidence of an emptied or restored database.
 
-refuse_strangers(settings)      # before the start: files are here and the database knows no patient
-doubt(c, settings)              # before any file is taken away: None, or why it is not
-accept(db, settings)            # somebody answers: this database is the right one (`sagittal accept`)
+refuse_strangers(settings)      # before the start: files exist but the database has no patient
+doubt(c, settings)              # before deleting files: None, or the reason for doubt
+accept(db, settings)            # the operator confirms this database (`sagittal accept`)
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ ACCEPTED = "database.accepted"
 
 
 class StrangersError(RuntimeError):
-    """Stored files are here that the database knows nothing of; the message says what to do."""
+    """Stored files are unknown to the database; the message contains a remedy."""
 
 
 def refuse_strangers(settings: Settings) -> None:
-    """Raise StrangersError when files are here and the database is missing or knows no patient.
+    """Raise StrangersError if stored files exist and the database is missing or has no patients.
 
-    Creates no database; a file that cannot be read is left to `storage.migrate`, which says so.
+    Creates no database; an unreadable file is left to `storage.migrate`, which reports it.
     """
     if not exists(settings.database_source):
         refuse_half_restored(settings)
@@ -58,7 +58,7 @@ def refuse_strangers(settings: Settings) -> None:
 
 
 def refuse_half_restored(settings: Settings) -> None:
-    """Raise StrangersError where a restore was cut off before it put the database in place; makes nothing."""
+    """Raise StrangersError if a restore was interrupted before the database was in place; creates nothing."""
     if settings.restoring.exists() and not exists(settings.database_source):
         raise StrangersError(
             f"A restore into {settings.data_dir} was interrupted. Run `sagittal restore` again; to begin "
@@ -67,7 +67,9 @@ def refuse_half_restored(settings: Settings) -> None:
 
 
 def refuse_wrong_clock(db: Database, settings: Settings) -> bool:
-    """Raise StrangersError where this host's clock is not the database's; False = the database is here."""
+    """Raise StrangersError if this host's clock differs from the database's; False = the database is
+    local.
+    """
     theirs = db.read_clock()
     if theirs is None:
         return False
@@ -83,11 +85,11 @@ def refuse_wrong_clock(db: Database, settings: Settings) -> bool:
 def refuse_foreign_folder(
     db: Database, settings: Settings, stop: threading.Event, patience_s: float = 10.0
 ) -> None:
-    """Raise StrangersError where this host's data folder or clock is not that of the PostgreSQL database.
+    """Raise StrangersError if this host's data folder or clock does not match the PostgreSQL database.
 
-    A worker elsewhere needs the server's own folder of stored files (shared by the network), and leases need
-    clocks that agree. The server writes the mark some seconds after the first row of the audit log; until
-    there is one nobody has work, and this waits (`stop` ends it).
+    A worker on another host needs the server's folder of stored files (a network share), and leases require
+    synchronized clocks. The server writes the mark some seconds after the first row of the audit log; until
+    then there is no work, and this function waits (`stop` ends it).
     """
     if not refuse_wrong_clock(db, settings):
         return
@@ -111,7 +113,7 @@ def refuse_foreign_folder(
 
 
 def find_doubt(c: Connection, settings: Settings) -> str | None:
-    """Why no stored file may be taken away on the word of this database, as a sentence; None = it may."""
+    """Reason not to delete files on the evidence of this database, as a sentence; None = none."""
     try:
         return _doubt(c, settings)
     except StoreAway:
@@ -122,7 +124,7 @@ def find_doubt(c: Connection, settings: Settings) -> str | None:
 
 
 def accept(db: Database, settings: Settings) -> str | None:
-    """Trust this database from now on; returns what was doubted, None = nothing was. Raises StoreAway."""
+    """Trust this database from now on; return the former doubt, None = there was none. Raises StoreAway."""
     with db.write() as c:
         doubted = _doubt(c, settings)
         if doubted is not None:
@@ -146,7 +148,7 @@ def _strangers_of(
 
 
 def _strangers_if_known(settings: Settings, erased: set[str]) -> str | None:
-    """As `_strangers`; None also when the files are in a bucket that is away: then nobody knows."""
+    """Like `_strangers`, but None if the files are in a bucket that is unavailable."""
     try:
         return _strangers(settings, erased)
     except StoreAway:
@@ -160,8 +162,8 @@ def _strangers(settings: Settings, erased: set[str]) -> str | None:
     # a folder that was never a clinic's is left as it is: opening would make one
     stored = open_blobs(settings).files() if settings.bucket or settings.blobs.exists() else ()
     files = sum(1 for f in stored if f.space not in leaving)
-    found = (path for folder in settings.live_folders for path in folder.glob("*.log"))
-    logs = sum(1 for path in found if path.stem not in takes)
+    paths = (path for folder in settings.live_folders for path in folder.glob("*.log"))
+    logs = sum(1 for path in paths if path.stem not in takes)
     if not files and not logs:
         return None
     return (

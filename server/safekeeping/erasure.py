@@ -1,9 +1,9 @@
-"""Removing a session or a patient for good: rows in one transaction, then the bytes; the audit remembers.
+"""Permanent deletion of a session or patient: rows in one transaction, then files; the audit log remains.
 
-What was erased on purpose does not go to the trash, and what lay there of it goes, as do the old pages of the
-database's write-ahead log. A note in `erasing/` is written before the rows go and removed after the bytes: a
-crash between them is made good at the next start or sweep (`finish`). A running job of theirs loses its row,
-so its worker meets a closed fence and publishes nothing.
+Erased data do not go to the trash; copies in the trash and old pages of the database's write-ahead log are
+removed as well. A note in `erasing/` is written before the rows are deleted and removed after the files:
+after a crash the erasure is completed at the next start or sweep (`finish`). A running job loses its row, so
+its worker fails at the fence and publishes nothing.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ def erase_patient(
     *,
     confirm: str,
 ) -> None:
-    """Erase a patient with everything; `confirm` repeats the code, else Conflict not_confirmed."""
+    """Erase a patient with all data; `confirm` repeats the code, otherwise Conflict not_confirmed."""
     with db.write() as c:
-        found = patients.get(c, patient_id)
-        if confirm.strip() != found.code:
+        target = patients.get(c, patient_id)
+        if confirm.strip() != target.code:
             raise Conflict(
-                "not_confirmed", f"To delete this patient for good, repeat the code '{found.code}'."
+                "not_confirmed", f"To delete this patient for good, repeat the code '{target.code}'."
             )
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
         parts = list(c.execute(select(file_upload.c.id).where(file_upload.c.session_id.in_(mine))).scalars())
@@ -95,7 +95,7 @@ def erase_patient(
         for table in (patient_identity, consent, care_team_member, emergency_access):
             c.execute(delete(table).where(table.c.patient_id == patient_id))
         c.execute(delete(patient).where(patient.c.id == patient_id))
-        audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": found.sessions})
+        audit.record(c, actor, ERASED, "patient", patient_id, {"sessions": target.sessions})
         _note(settings, spaces=[patient_id], takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
@@ -106,19 +106,19 @@ def erase_session(
 ) -> None:
     """Erase one session with its recordings and results; raises NotFound."""
     with db.write() as c:
-        found = sessions.get(c, session_id)
-        own = _files_of(c, session_id, found.patient_id)
+        target = sessions.get(c, session_id)
+        own = _files_of(c, session_id, target.patient_id)
         mine = select(file_upload.c.id).where(file_upload.c.session_id == session_id)
         parts = list(c.execute(mine).scalars())
         takes = _erase_session_rows(c, session_id)
-        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": found.patient_id})
+        audit.record(c, actor, SESSION_ERASED, "session", session_id, {"patient_id": target.patient_id})
         _note(settings, files=sorted(own), takes=takes, parts=parts)
     reviewed.forget()
     finish(db, reviewed.blobs, settings)
 
 
 def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
-    """Remove the rows and return the ids of the live takes that were among them."""
+    """Delete the rows and return the ids of their live trials."""
     takes = list(c.execute(select(live_take.c.id).where(live_take.c.session_id == session_id)).scalars())
     c.execute(delete(live_event).where(live_event.c.take_id.in_(takes)))
     c.execute(delete(live_take).where(live_take.c.id.in_(takes)))
@@ -150,7 +150,7 @@ def _erase_session_rows(c: Connection, session_id: str) -> list[str]:
 
 
 def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
-    """Remove the bytes of every erasure whose rows are gone; what cannot be removed is tried again later."""
+    """Remove the files of every erasure whose rows are deleted; failures are retried later."""
     for path in sorted(settings.erasing.glob("*.json")):
         note = _read(path)
         if note is None:
@@ -172,22 +172,22 @@ def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
 
 
 def list_erased_spaces(c: Connection, among: Collection[str] | None = None) -> set[str]:
-    """Ids of all patients that were erased, or of those among some, as the audit log has them."""
+    """Ids of all erased patients, or of those among some, from the audit log."""
     query = select(audit_table.c.resource_id).where(audit_table.c.action == ERASED)
     if among is not None:
         query = query.where(audit_table.c.resource == "patient", audit_table.c.resource_id.in_(among))
-    found = set(c.execute(query).scalars())
-    return found - set(c.execute(select(patient.c.id)).scalars())
+    ids = set(c.execute(query).scalars())
+    return ids - set(c.execute(select(patient.c.id)).scalars())
 
 
 def list_unfinished(settings: Settings) -> tuple[set[str], set[str]]:
-    """Patients and live takes of erasures that are not finished."""
+    """Patients and live trials of unfinished erasures."""
     notes = [note for path in settings.erasing.glob("*.json") if (note := _read(path)) is not None]
     return {x for note in notes for x in note["spaces"]}, {x for note in notes for x in note["takes"]}
 
 
 def _files_of(c: Connection, session_id: str, patient_id: str) -> set[tuple[str, str]]:
-    """Every file of a session, also those that were taken out of it and may lie in the trash."""
+    """All files of a session, including removed ones that may be in the trash."""
     added = select(audit_table.c.detail["sha256"].as_string()).where(
         audit_table.c.action.in_(("recording.file_added", "reference.added", "video.added")),
         audit_table.c.detail["session_id"].as_string() == session_id,
@@ -204,7 +204,7 @@ def _note(
     takes: Iterable[str] = (),
     parts: Iterable[str] = (),
 ) -> None:
-    """Write durably what is about to be erased: ids and hashes only."""
+    """Durably record ids and hashes that are about to be erased."""
     fs.make_folder(settings.erasing)
     content = {"spaces": list(spaces), "files": list(files), "takes": list(takes), "parts": list(parts)}
     fs.write_file(settings.erasing / f"{new_id()}.json", json.dumps(content).encode())
@@ -226,10 +226,10 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _remove(db: Database, blobs: BlobStore, settings: Settings, note: dict[str, Any]) -> None:
-    """Remove what a note lists and no row needs; the rows are still there when the erasure was given up.
+    """Remove the content of a note unless rows still refer to it, as after an aborted erasure.
 
-    Under the write lock, where whoever wrote the note has either committed or given up, only what may be
-    stored again is removed, some at a time: an erased patient, take or upload never comes back.
+    Only files that may be stored again are removed under the write lock, some at a time, when the author of
+    the note has committed or aborted; erased patients, trials and uploads never return.
     """
     with db.write() as c:
         spaces, takes, parts = (

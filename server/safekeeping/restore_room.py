@@ -1,6 +1,6 @@
-"""Where a restore may go: an empty data folder, with an empty database and bucket.
+"""Target of a restore: an empty data folder with an empty database and bucket.
 
-What a killed restore, or a server that did not start, left there is removed.
+Remains of a killed restore, or of a server that failed to start, are removed.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ _MARGIN: Final = 1.1
 
 
 class RestoreError(Exception):
-    """Nothing was put in place; the message says why and what to do."""
+    """Nothing was restored; the message gives reason and remedy."""
 
 
 def make_empty(settings: Settings) -> None:
-    """Remove what a killed restore left; raise RestoreError when anything else is here.
+    """Remove the remains of a killed restore; raise RestoreError if there is anything else.
 
-    Which bucket it had begun to fill stays noted until a restore is in its place.
+    The bucket it had begun to fill remains recorded until a restore succeeds.
     """
     stage = settings.restoring
     placing = ""
@@ -50,15 +50,15 @@ def make_empty(settings: Settings) -> None:
                 fs.remove_file(path)
             fs.sync_folder(settings.data_dir)
         clear_stage(stage)
-    found = _find_others(settings)
+    names = _find_others(settings)
     if _has_database(settings) and settings.database_url:
         raise RestoreError(
             "The PostgreSQL database holds a clinic already; nothing was changed. Make an empty one and set "
             "SAGITTAL_DATABASE_URL to it."
         )
-    if found:
+    if names:
         raise RestoreError(
-            f"{settings.data_dir} is not empty ({', '.join(found[:5])}). Restore into an empty folder; move "
+            f"{settings.data_dir} is not empty ({', '.join(names[:5])}). Restore into an empty folder; move "
             "the old one aside first, and keep it."
         )
     fs.remove_tree(settings.blobs)  # no file is in it
@@ -68,7 +68,7 @@ def make_empty(settings: Settings) -> None:
 
 
 def _find_others(settings: Settings) -> list[str]:
-    """Names of what an empty data folder does not hold."""
+    """Names of files that do not belong in an empty data folder."""
 
     def is_of_a_start(path: Path) -> bool:
         way = path.relative_to(settings.data_dir).as_posix() + ("/" if path.is_dir() else "")
@@ -96,7 +96,7 @@ def _require_empty_bucket(settings: Settings) -> None:
 
 
 def _has_database(settings: Settings) -> bool:
-    """Whether a clinic is in it already: a file, or rows on the server; tables of another version are one."""
+    """Whether a database exists: a file, or rows on the server; tables of another version count."""
     if not settings.database_url:
         return settings.database.exists()
     if not exists(settings.database_source):
@@ -110,19 +110,19 @@ def _has_database(settings: Settings) -> bool:
 
 
 def require_room(archive: Path, folder: Path) -> None:
-    """Raise RestoreError where the disk has no room for what is in the archive."""
+    """Raise RestoreError if the disk has too little space for the content of the archive."""
     needed, free = int(archive.stat().st_size * _MARGIN), shutil.disk_usage(folder).free
     if free < needed:
         raise RestoreError(f"A restore needs {needed} bytes in {folder}; {free} are free. Make room first.")
 
 
 def name_placing(stage: Path) -> Path:
-    """The file that says that the renames have begun."""
+    """Path of the file that marks the start of the renames."""
     return stage / "placing"
 
 
 def _read_placing(stage: Path) -> str:
-    """The bucket that a killed restore has begun to fill, "" = none."""
+    """The bucket that a killed restore began to fill, "" = none."""
     try:
         return name_placing(stage).read_text("utf-8")
     except FileNotFoundError:
@@ -130,7 +130,7 @@ def _read_placing(stage: Path) -> str:
 
 
 def clear_stage(stage: Path) -> None:
-    """Remove the stage, but for the note which bucket is half filled: the next restore must know it."""
+    """Remove the staging folder, but keep the record of a partly filled bucket for the next restore."""
     if not _read_placing(stage):
         fs.remove_tree(stage)
         return
@@ -143,5 +143,5 @@ def clear_stage(stage: Path) -> None:
 
 
 def open_empty_bucket(settings: Settings) -> BucketBlobs:
-    """The bucket that a restore fills; what passes is in the stage."""
+    """Open the bucket to be filled by a restore; files in transit are in the staging folder."""
     return BucketBlobs(settings.bucket, settings.restoring / "incoming")

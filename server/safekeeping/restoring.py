@@ -1,7 +1,7 @@
-"""Putting a backup back: into an empty data folder, everything checked before anything is in its place.
+"""Restore of a backup into an empty data folder, after verifying everything.
 
-    restored = restore(archive, settings, key)            # settings.data_dir: empty or not there
-    restored = try_restore(archive, settings, key)       # the same into a folder that is removed again
+    restored = restore(archive, settings, key)            # settings.data_dir: empty or missing
+    restored = try_restore(archive, settings, key)       # into a temporary folder
 
 All of it is written into `restoring/` of that folder and verified there: every hash, the database by SQLite's
 own checks, the audit chain, every file that a row refers to. Who was erased since is erased again. Then some
@@ -69,12 +69,12 @@ _MOST_MANIFEST: Final = 500_000_000
 
 @dataclass(frozen=True)
 class BackupManifest:
-    """What a backup says of itself.
+    """Manifest of a backup.
 
     Parameters
     ----------
-    files : (name, bytes, sha256) of everything in it. missing : files that were gone when it was made.
-    erased : who had been erased by then. patients, sessions : how many rows.
+    files : (name, bytes, sha256) of all content. missing : files already missing at the time.
+    erased : patients and sessions erased by then. patients, sessions : numbers of rows.
     """
 
     created_at: dt.datetime
@@ -88,14 +88,14 @@ class BackupManifest:
 
 @dataclass(frozen=True)
 class RestoredClinic:
-    """What was put back.
+    """Summary of a restore.
 
     Parameters
     ----------
-    created_at : when the backup was made. patients, sessions : how many are there now.
-    files : stored files and live logs. erased_again : patients and sessions that had been erased since.
-    missing : files that the backup itself said were gone.
-    names_open : whether the key in the backup opens all names of patients, or there are none.
+    created_at : time of the backup. patients, sessions : restored numbers.
+    files : stored files and live logs. erased_again : patients and sessions erased since the backup.
+    missing : files that the backup lists as missing.
+    names_open : whether the key in the backup decrypts all identities, or there are none.
     """
 
     created_at: dt.datetime
@@ -110,16 +110,18 @@ class RestoredClinic:
 def restore(
     archive: Path, settings: Settings, key: ClinicKey | None, erased: Tombstones | None = None
 ) -> RestoredClinic:
-    """Put a backup into the empty folder `settings.data_dir`.
+    """Restore a backup into the empty folder `settings.data_dir`.
 
     Parameters
     ----------
-    erased : who must not come back, besides those that the backup and `erased.json` beside it name.
+    erased : patients and sessions to exclude, in addition to those in the backup and in `erased.json` next to
+        it.
 
     Raises
     ------
     RestoreError, BackupFileError, TombstoneError
-        the folder is in use or holds something, the backup is damaged, cut, encrypted or of a newer version.
+        the folder is in use or not empty, or the backup is damaged, truncated, encrypted or of a newer
+        version.
     """
     if not archive.is_file():
         raise RestoreError(f"There is no file {archive}.")
@@ -147,7 +149,7 @@ def restore(
 
 
 def try_restore(archive: Path, settings: Settings, key: ClinicKey | None) -> RestoredClinic:
-    """Restore a backup of this clinic beside it, and remove it again; raises as `restore` does."""
+    """Restore a backup of this clinic into a temporary folder; raises like `restore`."""
     home = settings.backups / "restore-test"
     fs.remove_tree(home)
     try:
@@ -171,7 +173,7 @@ def _restore(archive: Path, settings: Settings, key: ClinicKey | None, gone: Tom
 
 
 def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombstones) -> RestoredClinic:
-    """Write and verify everything in the stage, and erase again who was erased."""
+    """Extract and verify everything in the staging folder, and repeat erasures."""
     manifest = _extract(archive, stage, key)
     upgrade(stage.database)
     fs.remove_tree(stage.backups)  # the copy that the upgrade made
@@ -179,8 +181,8 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     fs.make_folder(stage.live)
     with closing(Database(stage.database)) as db:
         with db.read() as c:
-            head, counted = read_newest(c), count_patients_and_sessions(c)
-        if head != manifest.audit_head or counted != (manifest.patients, manifest.sessions):
+            head, counts = read_newest(c), count_patients_and_sessions(c)
+        if head != manifest.audit_head or counts != (manifest.patients, manifest.sessions):
             raise RestoreError(f"{archive.name}: its database is not the one that its manifest describes.")
         defects = [
             defect
@@ -189,7 +191,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
         ]
         if defects:
             raise RestoreError(f"{archive.name}: {defects[0].area}: {defects[0].message}")
-        again = _erase_again(db, blobs, stage, gone | manifest.erased)
+        erased_counts = _erase_again(db, blobs, stage, gone | manifest.erased)
         with db.write() as c:
             # who had signed in then has not signed in here; what was revoked since must not work again
             for table in (login_session, failed_attempt, web_node):
@@ -199,7 +201,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             c.execute(delete(one_time_token))
             c.execute(update(report_link).where(report_link.c.revoked_at.is_(None)).values(revoked_at=now()))
             care_teams.end_all_emergencies(c)
-            detail = {"created_at": manifest.created_at.isoformat(), "erased_again": again}
+            detail = {"created_at": manifest.created_at.isoformat(), "erased_again": erased_counts}
             audit.record(c, None, RESTORED, "database", None, detail)
         with db.read() as c:
             people, visits = count_patients_and_sessions(c)
@@ -208,13 +210,13 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     fs.sync_file(stage.database)
     files = sum(1 for _ in blobs.files()) + sum(1 for _ in stage.live.iterdir())
     return RestoredClinic(
-        manifest.created_at, people, visits, files, again, len(manifest.missing), names_open
+        manifest.created_at, people, visits, files, erased_counts, len(manifest.missing), names_open
     )
 
 
 def _extract(archive: Path, stage: Settings, key: ClinicKey | None) -> BackupManifest:
-    """Write every file of the archive and compare them with its manifest, which comes last."""
-    found: set[tuple[str, int, str]] = set()
+    """Extract every file of the archive and compare it with the manifest, which comes last."""
+    extracted: set[tuple[str, int, str]] = set()
     manifest: BackupManifest | None = None
     with closing(read_archive(archive, key)) as members:
         for name, size, content in members:
@@ -225,13 +227,13 @@ def _extract(archive: Path, stage: Settings, key: ClinicKey | None) -> BackupMan
                     raise RestoreError(f"{archive.name}: a manifest of {size} bytes is none of ours.")
                 manifest = _read_manifest(archive, content.read(size))
             elif name == DATABASE or _OURS.fullmatch(name):
-                found.add((name, size, _write(stage.data_dir / name, content)))
+                extracted.add((name, size, _write(stage.data_dir / name, content)))
             else:
                 raise RestoreError(f"{archive.name} holds '{name[:80]}', which no backup does.")
     if manifest is None:
         raise RestoreError(f"{archive.name} is damaged or was cut: it has no manifest. Use another backup.")
-    if found != manifest.files:
-        wrong = sorted(one[0] for one in found ^ manifest.files)
+    if extracted != manifest.files:
+        wrong = sorted(one[0] for one in extracted ^ manifest.files)
         raise RestoreError(
             f"{archive.name} is damaged: {wrong[0]} is not what was stored. Use another backup."
         )
@@ -271,7 +273,7 @@ def _read_manifest(archive: Path, data: bytes) -> BackupManifest:
 
 
 def _erase_again(db: Database, blobs: BlobStore, stage: Settings, gone: Tombstones) -> int:
-    """Erase who is on the list and came back; return how many patients and sessions."""
+    """Repeat the listed erasures; return the numbers of patients and sessions."""
     with db.read() as c:
         visits = c.execute(select(session.c.id).where(session.c.id.in_(gone.sessions))).scalars().all()
         people = c.execute(select(patient.c.id).where(patient.c.id.in_(gone.patients))).scalars().all()
@@ -286,14 +288,14 @@ def _erase_again(db: Database, blobs: BlobStore, stage: Settings, gone: Tombston
 
 
 def _at(settings: Settings, folder: Path) -> Settings:
-    """The same installation in another folder, its database a file there."""
+    """Settings for the same installation in another folder, with a database file there."""
     return replace(
         settings, data_dir=folder, database_url="", bucket="", identity_key="", node_name="", node_address=""
     )
 
 
 def _fill_bucket(settings: Settings, stage: Settings) -> None:
-    """Put every stored file of the stage into the bucket, so that only its note is to be put in place."""
+    """Upload every stored file of the stage, so that only the database remains to be put in place."""
     bucket, staged = open_empty_bucket(settings), FolderBlobs(stage.blobs)
     for one in staged.files():
         bucket.adopt(one.space, staged.path(one.space, one.name), one.name)

@@ -1,12 +1,12 @@
-"""Taking away stored files that no row refers to: cut uploads, results of lost claims, replaced files.
+"""Deletion of unreferenced stored files: interrupted uploads, results of lost claims, replaced files.
 
-They go to the trash for 30 days, because a database that was put back from a backup refers to few of them;
-after one went back in time nothing is taken away at all (services/custody.py). Only what nobody was ever
-promised (half received) and what was erased on purpose goes at once.
+They remain in the trash for 30 days, because a database restored from a backup refers to fewer files; after a
+restore nothing is deleted until confirmed (services/custody.py). Only partially received files and erased
+data are removed immediately.
 
-A file may be young because somebody is about to refer to it, so only files older than a grace time go. They
-go while the write lock is held: a publisher either has committed (the reference is seen) or will find its
-file gone in its own transaction (BlobStore.require) and fail cleanly.
+A recent file may be about to be referenced, so only files older than a grace period are removed, under the
+write lock: a publisher has either committed (the reference is visible) or will find its file missing in its
+own transaction (BlobStore.require) and fail cleanly.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ log = logging.getLogger(__name__)
 
 
 def sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
-    """Move unreferenced files older than `settings.sweep_grace_s` to the trash and empty that of old ones.
+    """Move unreferenced files older than `settings.sweep_grace_s` to the trash and delete expired ones.
 
     Returns
     -------
-    How many stored files were taken away; 0 when this database is in doubt, or another sweep is under way.
+    Number of files moved; 0 if this database is in doubt, or another sweep is in progress.
     """
     try:
         with blobs.lock_sweep():
@@ -55,45 +55,45 @@ def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     uploads.drop_abandoned(db, blobs)
     with db.read() as c:
         used = _list_used(c)
-    trash, at, taken, step = blobs.trash, now(), 0, blobs.moved_at_once
+    trash, time, count, step = blobs.trash, now(), 0, blobs.moved_at_once
     idle = [f for f in old if (f.space, f.name) not in used]
     for group in (idle[i : i + step] for i in range(0, len(idle), step)):
         going = [(f.space, f.name) for f in group if f.space != INCOMING and f.space not in erased]
-        kept, gone = [], []
-        trash.prepare(going, at)
+        removable, gone = [], []
+        trash.prepare(going, time)
         with db.write() as c:
             # again: somebody may have been erased while copies were made
             used, since = _list_used(c), erasure.list_erased_spaces(c, {f.space for f in group})
             for stored in group:
                 if (stored.space, stored.name) in used or not blobs.is_older(stored, settings.sweep_grace_s):
                     continue
-                taken += 1
+                count += 1
                 if stored.space == INCOMING or stored.space in since:
                     gone.append(stored)
                 else:
-                    kept.append((stored.space, stored.name))
+                    removable.append((stored.space, stored.name))
             blobs.discard(gone)
-            trash.take(kept, at)
-        trash.forget(set(going) - set(kept), at)
-        trash.settle(kept, at)
-        if kept:
-            log.warning("%d stored files that nothing refers to are in %s now", len(kept), trash.place)
+            trash.take(removable, time)
+        trash.forget(set(going) - set(removable), time)
+        trash.settle(removable, time)
+        if removable:
+            log.warning("%d stored files that nothing refers to are in %s now", len(removable), trash.place)
     trash.expire(now())
     with db.read() as c:
         erased = erasure.list_erased_spaces(c)
     # a sweep that was killed between copying and taking leaves copies
     if left := [one for one in trash.files() if one.space in erased]:
         trash.drop(left)
-    return taken
+    return count
 
 
 def _list_used(c: Connection) -> set[tuple[str, str]]:
-    """(space, name) of every file that a row refers to, of those that are still coming too."""
+    """(space, name) of every referenced file, including unfinished uploads."""
     return list_referenced(c) | {(INCOMING, name) for name in uploads.list_parts(c)}
 
 
 def put_back(db: Database, blobs: BlobStore) -> int:
-    """Move missing files that a row refers to from the trash to their place; return how many."""
+    """Restore missing referenced files from the trash; return their number."""
     trash = blobs.trash
     back = 0
     with db.write() as c:

@@ -1,7 +1,7 @@
-"""Who has been erased: a list beside the backups, so that an older backup brings nobody back.
+"""List of erased patients and sessions, stored with the backups, so that restores exclude them.
 
-Every backup holds the list of its moment; `erased.json` in the folder of backups follows within a minute of
-an erasure, and only grows. It holds random ids, nothing of a person.
+Every backup contains the list at its time; `erased.json` in the backup folder is updated within a minute of
+an erasure and only grows. It contains random ids and no personal data.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ NAME: Final = "erased.json"
 
 
 class TombstoneError(Exception):
-    """The list is there but cannot be read; the message names it."""
+    """The list exists but cannot be read; the message names the file."""
 
 
 @dataclass(frozen=True)
 class Tombstones:
-    """Ids of patients and sessions that were erased."""
+    """Ids of erased patients and sessions."""
 
     patients: frozenset[str] = frozenset()
     sessions: frozenset[str] = frozenset()
 
-    def __or__(self, other: Tombstones) -> Tombstones:
-        return Tombstones(self.patients | other.patients, self.sessions | other.sessions)
+    def __or__(self, operand: Tombstones) -> Tombstones:
+        return Tombstones(self.patients | operand.patients, self.sessions | operand.sessions)
 
     def tree(self) -> dict[str, list[str]]:
-        """For JSON."""
+        """Convert to JSON."""
         return {"patients": sorted(self.patients), "sessions": sorted(self.sessions)}
 
 
 def find_tombstones(c: Connection) -> Tombstones:
-    """Everybody and everything that the audit log says was erased."""
+    """All erased patients and sessions according to the audit log."""
     rows = c.execute(
         select(audit.c.action, audit.c.resource_id).where(audit.c.action.in_((ERASED, SESSION_ERASED)))
     ).all()
@@ -52,7 +52,7 @@ def find_tombstones(c: Connection) -> Tombstones:
 
 
 def parse_tombstones(tree: Any) -> Tombstones:
-    """Read what `tree` gave; raises ValueError."""
+    """Parse the result of `tree`; raises ValueError."""
     try:
         return Tombstones(
             frozenset(str(one) for one in tree["patients"]), frozenset(str(one) for one in tree["sessions"])
@@ -62,7 +62,7 @@ def parse_tombstones(tree: Any) -> Tombstones:
 
 
 def read_tombstones(path: Path) -> Tombstones:
-    """The list of a file, empty when there is none; raises TombstoneError."""
+    """Read the list from a file, empty if it does not exist; raises TombstoneError."""
     try:
         return parse_tombstones(read_json(path.read_bytes()))
     except FileNotFoundError:
@@ -73,9 +73,9 @@ def read_tombstones(path: Path) -> Tombstones:
         ) from error
 
 
-def keep_tombstones(found: Tombstones, folder: Path) -> None:
-    """Add to the list in a folder of backups; nothing is written when all are in it."""
+def keep_tombstones(erased: Tombstones, folder: Path) -> None:
+    """Add to the list in a backup folder; nothing is written if all are included."""
     path = folder / NAME
-    known = read_tombstones(path)
-    if not path.exists() or known | found != known:
-        fs.write_file(path, json.dumps((known | found).tree()).encode())
+    stored = read_tombstones(path)
+    if not path.exists() or stored | erased != stored:
+        fs.write_file(path, json.dumps((stored | erased).tree()).encode())

@@ -1,1 +1,1 @@
-"""Who may read results: signed reports, links to them, care teams, PDFs."""
+"""Sharing of results: signed reports, links to them, care teams, PDFs."""

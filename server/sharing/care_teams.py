@@ -1,6 +1,6 @@
-"""Care teams: who is in the team of which patient, and who opened somebody in an emergency.
+"""Care teams of patients, and emergency access from outside a team.
 
-Off until an administrator switches them on; what they decide is server/auth/sight.py.
+Disabled until an administrator enables them; for their effect see server/auth/sight.py.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _NOT_OF_A_TEAM: Final = (
 
 @dataclass(frozen=True)
 class TeamMember:
-    """Somebody who may be or is in a team."""
+    """An actual or possible member of a team."""
 
     user_id: str
     name: str
@@ -52,11 +52,11 @@ class TeamMember:
 
 @dataclass(frozen=True)
 class EmergencyAccess:
-    """Somebody outside the team opened the patient: by whom (name, account), why, from when to when.
+    """Emergency access from outside the team: user (name, account), reason and period.
 
     Parameters
     ----------
-    ended_at : somebody ended it then, before its time. is_open : it went on when it was read.
+    ended_at : time of an early end. is_open : in effect at the time of reading.
     """
 
     id: str
@@ -76,36 +76,36 @@ def are_on(c: Connection) -> bool:
 
 
 def switch_on(c: Connection, actor: audit.Actor, *, begin_with_past: bool) -> None:
-    """From now on a patient is seen by the team only; without effect where they are on.
+    """Restrict each patient to its care team; no effect if already enabled.
 
-    Links to reports end where their maker is not in the team.
+    Links to reports end if their creator is not in the team.
 
     Parameters
     ----------
-    begin_with_past : whoever has opened or changed something of a patient so far is in the team; a team that
-    was set before stays as it is.
+    begin_with_past : users who have accessed or changed a patient's data join the team; existing teams are
+        unchanged.
     """
     if are_on(c):
         return
-    at = now()
+    time = now()
     rows = _list_past(c) if begin_with_past else []
     if rows:
-        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": at} for p, u in rows])
-    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=at))
+        c.execute(insert(care_team_member), [{"patient_id": p, "user_id": u, "since": time} for p, u in rows])
+    c.execute(insert(clinic_option).values(name=CARE_TEAMS, since=time))
     audit.record(c, actor, "care_teams.on", "clinic", None, {"members": len(rows)})
     report_links.end_orphaned(c, actor)
 
 
 def switch_off(c: Connection, actor: audit.Actor) -> None:
-    """From now on everybody sees every patient; the teams are kept."""
+    """Give all users access to all patients; the teams are retained."""
     if c.execute(delete(clinic_option).where(clinic_option.c.name == CARE_TEAMS)).rowcount:
         audit.record(c, actor, "care_teams.off", "clinic", None)
 
 
 def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]:
-    """Who is or can be in the team of a patient, by name, and whether in it.
+    """Possible and actual members of a patient's team, by name.
 
-    Open accounts can, but administrators, who see everybody.
+    Active accounts can be members, except administrators, who have access to all patients.
     """
     mine = (care_team_member.c.user_id == user.c.id) & (care_team_member.c.patient_id == patient_id)
     can = user.c.active & (user.c.role != Role.ADMIN)
@@ -122,7 +122,7 @@ def list_people(c: Connection, patient_id: str) -> list[tuple[TeamMember, bool]]
 
 
 def list_team(c: Connection, patient_id: str) -> list[TeamMember]:
-    """The team of a patient, by name."""
+    """Care team of a patient, by name."""
     return [one for one, is_in in list_people(c, patient_id) if is_in]
 
 
@@ -134,97 +134,104 @@ def set_team(
     Raises
     ------
     NotFound
-        the patient, or no open account has one of the ids.
+        the patient does not exist, or an id belongs to no active account.
     """
     patients.get(c, patient_id)
-    wanted = set(user_ids)
-    known = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
-    before = {user_id for user_id, is_in in known.items() if is_in}
-    unknown = wanted - known.keys()
+    members = set(user_ids)
+    membership = {one.user_id: is_in for one, is_in in list_people(c, patient_id)}
+    previous = {user_id for user_id, is_in in membership.items() if is_in}
+    unknown = members - membership.keys()
     if unknown:
         raise NotFound("account for a team", min(unknown))
-    gone = care_team_member.c.user_id.in_(before - wanted)
+    gone = care_team_member.c.user_id.in_(previous - members)
     c.execute(delete(care_team_member).where(care_team_member.c.patient_id == patient_id, gone))
-    for user_id in sorted(wanted - before):
+    for user_id in sorted(members - previous):
         c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user_id, since=now()))
-    if wanted != before:
-        detail = {"added": sorted(wanted - before), "removed": sorted(before - wanted)}
+    if members != previous:
+        detail = {"added": sorted(members - previous), "removed": sorted(previous - members)}
         audit.record(c, actor, "care_team.changed", "patient", patient_id, detail)
         report_links.end_orphaned(c, actor)
     return list_team(c, patient_id)
 
 
-def add_maker(c: Connection, who: Identity, patient_id: str) -> None:
-    """Put whoever adds a patient into the team, or nobody but administrators would see the patient."""
-    if who.role is not Role.ADMIN and are_on(c):
-        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=who.user_id, since=now()))
+def add_maker(c: Connection, user: Identity, patient_id: str) -> None:
+    """Add the user who creates a patient to its team; otherwise only administrators would have access."""
+    if user.role is not Role.ADMIN and are_on(c):
+        c.execute(insert(care_team_member).values(patient_id=patient_id, user_id=user.user_id, since=now()))
         audit.record(
-            c, who, "care_team.changed", "patient", patient_id, {"added": [who.user_id], "removed": []}
+            c, user, "care_team.changed", "patient", patient_id, {"added": [user.user_id], "removed": []}
         )
 
 
-def open_in_emergency(c: Connection, who: Identity, code: str, reason: str) -> EmergencyAccess:
-    """Open a patient to somebody outside the team for a time.
+def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> EmergencyAccess:
+    """Give a user outside the team temporary access to a patient.
 
-    The code must be known: it is no way to look for people.
+    Requires the exact code, so that it cannot be used to search for patients.
 
     Raises
     ------
-    NotFound : no patient has exactly this code. ServiceError bad_value : no reason to speak of. Conflict
+    NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
+        Conflict
     care_teams_off, seen_already.
     """
     if not are_on(c):
         raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
-    why = " ".join(reason.split())
-    if not REASON[0] <= len(why) <= REASON[1]:
+    text = " ".join(reason.split())
+    if not REASON[0] <= len(text) <= REASON[1]:
         raise ServiceError(
             "bad_value",
-            f"The reason has {len(why)} {plural(len(why), 'character', 'characters')}. "
+            f"The reason has {len(text)} {plural(len(text), 'character', 'characters')}. "
             f"Expected {REASON[0]} to {REASON[1]}.",
         )
-    wanted = normalize("NFKC", code).strip()
-    found = c.execute(select(patient.c.id).where(patient.c.code == wanted)).scalar()
-    if found is None:
-        raise NotFound("patient", wanted)
-    if may_open(c, who, {"patient_id": found}):
+    normalized = normalize("NFKC", code).strip()
+    patient_id = c.execute(select(patient.c.id).where(patient.c.code == normalized)).scalar()
+    if patient_id is None:
+        raise NotFound("patient", normalized)
+    if may_open(c, user, {"patient_id": patient_id}):
         raise Conflict("seen_already", "You may open this patient already; look in the list of patients.")
-    at = now()
-    row = {"id": new_id(), "patient_id": found, "reason": why, "opened_at": at, "ends_at": at + EMERGENCY}
-    c.execute(insert(emergency_access).values(**row, user_id=who.user_id))
+    time = now()
+    row = {
+        "id": new_id(),
+        "patient_id": patient_id,
+        "reason": text,
+        "opened_at": time,
+        "ends_at": time + EMERGENCY,
+    }
+    c.execute(insert(emergency_access).values(**row, user_id=user.user_id))
     # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
     detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
-    audit.record(c, who, "emergency.opened", "patient", found, detail)
+    audit.record(c, user, "emergency.opened", "patient", patient_id, detail)
     return _get_access(c, row["id"])
 
 
-def may_end(access: EmergencyAccess, who: Identity) -> bool:
-    """Whether somebody may end an access: whose it is, and administrators."""
-    return who.is_admin or access.by_id == who.user_id
+def may_end(access: EmergencyAccess, user: Identity) -> bool:
+    """Whether a user may end an access: its owner or an administrator."""
+    return user.is_admin or access.by_id == user.user_id
 
 
-def end_emergency(c: Connection, who: Identity, access_id: str) -> EmergencyAccess:
-    """End an access in an emergency now, and the links that hang on it; one that is over stays as it is.
+def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAccess:
+    """End an emergency access and the links that depend on it; no effect if it has ended.
 
     Raises
     ------
-    NotFound; NotAllowed `not_yours`, of somebody else's.
+    NotFound; NotAllowed `not_yours` for another user's access.
     """
-    found = _get_access(c, access_id)
-    if not may_end(found, who):
+    access = _get_access(c, access_id)
+    if not may_end(access, user):
         raise NotAllowed(
-            "not_yours", f"{found.by} opened this patient. Ask that person or an administrator to end it."
+            "not_yours", f"{access.by} opened this patient. Ask that person or an administrator to end it."
         )
-    if found.is_open:
+    if access.is_open:
         mine = emergency_access.c.id == access_id
         c.execute(update(emergency_access).where(mine).values(ended_at=now()))
-        report_links.end_of_emergency(c, who, access_id)
-        report_links.end_orphaned(c, who)
-        audit.record(c, who, "emergency.ended", "patient", found.patient_id, {"access": access_id})
+        report_links.end_of_emergency(c, user, access_id)
+        report_links.end_orphaned(c, user)
+        audit.record(c, user, "emergency.ended", "patient", access.patient_id, {"access": access_id})
     return _get_access(c, access_id)
 
 
 def end_all_emergencies(c: Connection) -> None:
-    """End every access in an emergency: of a database put back, who ended one since is not known."""
+    """End all emergency accesses after a restore, since later changes to them are unknown."""
     # those that are over too: the clock of this computer may be ahead
     unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
     over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
@@ -232,7 +239,7 @@ def end_all_emergencies(c: Connection) -> None:
 
 
 def list_accesses(c: Connection, patient_id: str) -> list[EmergencyAccess]:
-    """Who opened a patient in an emergency of late, the newest first."""
+    """Recent emergency accesses to a patient, newest first."""
     of_late = (emergency_access.c.patient_id == patient_id) & (emergency_access.c.opened_at > now() - SHOWN)
     query = _select_accesses().where(of_late).order_by(emergency_access.c.opened_at.desc())
     return [_make_access(row) for row in c.execute(query)]
@@ -265,9 +272,9 @@ def _make_access(row: Row[Any]) -> EmergencyAccess:
 
 
 def _list_past(c: Connection) -> list[tuple[str, str]]:
-    """Patient and person, of who has opened or changed something of a patient and still has an account.
+    """Pairs of patient and user with earlier access or changes, for existing accounts.
 
-    Left out: patients whose team was set before, and of a patient whoever came in an emergency.
+    Omits patients with an existing team, and users with emergency access to the patient.
     """
     is_work = audit_table.c.action.not_in(_NOT_OF_A_TEAM)
     of_patient = select(patient.c.id.label("patient_id"), audit_table.c.user_id).join(

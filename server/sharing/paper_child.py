@@ -1,4 +1,4 @@
-"""The process that makes one PDF and ends: its libraries and its memory never meet the web process.
+"""Process that renders one PDF, which isolates its libraries and memory from the web process.
 
 Started by server/sharing/pdfs.py as `python -m sagittal.server.sharing.paper_child <socket> <parent pid>`.
 """
@@ -10,13 +10,13 @@ import logging
 import msgspec
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.processes.child import enter_child
 from sagittal.server.report.pdf import render_pdf
-from sagittal.web.user_text import encode_user_text
 
 
 class PaperReply(msgspec.Struct, frozen=True):
-    """What became of a document: its PDF, or why there is none."""
+    """The PDF of a document, or the reason of failure."""
 
     content: bytes = b""
     code: str = ""
@@ -24,7 +24,7 @@ class PaperReply(msgspec.Struct, frozen=True):
 
 
 def main() -> None:
-    """Render the one document that comes over the line."""
+    """Render the one document received over the channel."""
     line, _ = enter_child()
     try:
         reply = PaperReply(render_pdf(line.receive().decode()))

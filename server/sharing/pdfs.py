@@ -1,4 +1,4 @@
-"""PDFs of documents that stand alone, each made by a process of its own, one at a time."""
+"""PDFs of self-contained documents, each rendered by its own process, one at a time."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ _turn = ErrandTurn()
 
 
 class PdfFailed(ServiceError):  # noqa: N818 - says what failed
-    """No PDF could be made of a document."""
+    """The PDF could not be created."""
 
     status = 503
 
 
 def make_pdf(settings: Settings, document: bytes) -> bytes:
-    """Make the PDF of a document that stands alone.
+    """Render a self-contained document as PDF.
 
     Raises
     ------
     PdfMissing
-        the library is not there. PdfFailed: others wait already, it took too long or ended without a word.
+        the library is not installed. PdfFailed: queue full, timeout, or the process died.
     """
     try:
         with _turn.take():
@@ -53,7 +53,7 @@ def make_pdf(settings: Settings, document: bytes) -> bytes:
 
 
 def read_signed_pdf(db: Database, blobs: BlobStore, settings: Settings, report_id: str) -> bytes:
-    """The PDF of a signed report: made of its stored document when it is first asked for, then kept.
+    """PDF of a signed report, rendered from its stored document at the first request and then stored.
 
     Raises
     ------

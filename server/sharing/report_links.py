@@ -1,10 +1,10 @@
-"""Links by which somebody without an account reads one signed report: they expire and can be revoked.
+"""Links that give readers without an account access to one signed report; they expire and can be revoked.
 
-Whoever has the address may read, so the address holds a random token of 256 bits that is shown once. The
-database keeps its hash and finds it by that: how long this takes tells nothing of the token. What a link
-opens bears a number instead of the patient's code. Who reopens a report ends its links. They also end with
-their maker's account, and as soon as the maker may no longer read the report (`end_orphaned`); what ends by
-the clock alone, such as an access in an emergency, is asked again whenever a link is opened.
+Knowing the URL is sufficient, so it contains a random 256-bit token that is shown only once. The database
+stores and indexes its hash, so the duration of a look-up reveals nothing about the token. The linked report
+shows a number instead of the patient's code. Reopening a report ends its links. They also end when their
+creator's account is closed or loses access to the report (`end_orphaned`); restrictions that depend on time,
+such as emergency access, are checked whenever a link is opened.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ QUIET: Final = dt.timedelta(minutes=1)
 
 @dataclass(frozen=True)
 class ReportLink:
-    """A link as people may see it; its address is not known any more.
+    """A link as shown to users, without its URL.
 
     Parameters
     ----------
-    openings, opened_at : how often it was opened, and when last.
-    emergency_id : the access in an emergency in which it was made and with which it ends; None = in none.
+    openings, opened_at : number of openings, and time of the last.
+    emergency_id : emergency access in which it was created and with which it ends; None = none.
     """
 
     id: str
@@ -55,12 +55,12 @@ class ReportLink:
 
     @property
     def is_open(self) -> bool:
-        """Whether its address still leads to the report."""
+        """Whether the link is valid."""
         return self.revoked_at is None and self.expires_at > now()
 
 
 class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
-    """No report under this address: unknown, expired, revoked; which one is not said."""
+    """No report for this URL: unknown, expired or revoked, without distinction."""
 
     status = 404
 
@@ -74,21 +74,21 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
 def make(
     c: Connection, actor: Identity | None, report_id: str, days: int, name: str
 ) -> tuple[ReportLink, str]:
-    """Make a link; the token is told here and never again. Made in an emergency it ends with that.
+    """Create a link and return its token, which is not stored; it ends with an emergency access.
 
     Raises
     ------
     NotFound
-        the report. ServiceError: bad_value. Conflict: not_in_force, of a report that was reopened.
+        the report. ServiceError: bad_value. Conflict: not_in_force, if the report was reopened.
     """
-    found = signed_reports.get(c, report_id)
-    if not found.in_force:
-        raise Conflict("not_in_force", f"Version {found.number} was reopened. Share the one that is signed.")
+    report = signed_reports.get(c, report_id)
+    if not report.in_force:
+        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the one that is signed.")
     if not 1 <= days <= MOST_DAYS:
         raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
-    patient_id = sessions.get(c, found.session_id).patient_id
+    patient_id = sessions.get(c, report.session_id).patient_id
     emergency = find_emergency(c, actor, patient_id)
     if emergency is not None:
         expires_at = min(expires_at, emergency.ends_at)
@@ -108,22 +108,22 @@ def make(
     detail = {"report_id": report_id, "link_id": link_id, "days": days}
     if emergency is not None:
         detail["access"] = emergency.id
-    audit.record(c, actor, "report_link.made", "session", found.session_id, detail)
+    audit.record(c, actor, "report_link.made", "session", report.session_id, detail)
     return get(c, link_id), token
 
 
 def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str | None = None) -> ReportLink:
-    """End a link now; one that has ended stays as it is. Raises NotFound.
+    """End a link; no effect if it has ended. Raises NotFound.
 
     Parameters
     ----------
-    because : reason for the audit log, None = somebody ended this link.
+    because : reason for the audit log, None = revoked by a user.
     """
-    found = get(c, link_id)
-    if found.revoked_at is None:
+    link = get(c, link_id)
+    if link.revoked_at is None:
         c.execute(update(report_link).where(report_link.c.id == link_id).values(revoked_at=now()))
-        session_id = signed_reports.get(c, found.report_id).session_id
-        detail = {"report_id": found.report_id, "link_id": link_id}
+        session_id = signed_reports.get(c, link.report_id).session_id
+        detail = {"report_id": link.report_id, "link_id": link_id}
         if because is not None:
             detail["because"] = because
         audit.record(c, actor, "report_link.revoked", "session", session_id, detail)
@@ -131,7 +131,7 @@ def revoke(c: Connection, actor: audit.Actor | None, link_id: str, because: str 
 
 
 def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -> None:
-    """End the links that were made in an emergency."""
+    """End the links created during an emergency access."""
     query = select(report_link.c.id).where(
         report_link.c.emergency_id == access_id, report_link.c.revoked_at.is_(None)
     )
@@ -140,13 +140,13 @@ def end_of_emergency(c: Connection, actor: audit.Actor | None, access_id: str) -
 
 
 def list_orphaned(c: Connection) -> list[str]:
-    """Return ids of open links whose maker's account is closed or may no longer read the report."""
+    """Ids of open links whose creator's account is closed or may no longer read the report."""
     query = _WITH_MAKER.where(report_link.c.revoked_at.is_(None), report_link.c.expires_at > now())
     return list(c.execute(query.where(~_may_share())).scalars())
 
 
 def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
-    """End those links; to be called in every transaction that takes access to patients from an account."""
+    """End orphaned links; call in every transaction that restricts an account's access to patients."""
     for link_id in list_orphaned(c):
         revoke(c, actor, link_id, because="maker_left")
 
@@ -154,27 +154,27 @@ def end_orphaned(c: Connection, actor: audit.Actor | None) -> None:
 def reopen_report(
     c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str
 ) -> signed_reports.SignedReport:
-    """Take a signed report out of force and end its links; raises as `signed_reports.reopen`."""
-    found = signed_reports.reopen(c, actor, report_id, reason, name)
-    for link in of_session(c, found.session_id):
+    """Reopen a signed report and end its links; raises like `signed_reports.reopen`."""
+    report = signed_reports.reopen(c, actor, report_id, reason, name)
+    for link in of_session(c, report.session_id):
         if link.report_id == report_id and link.is_open:
             revoke(c, actor, link.id)
-    return found
+    return report
 
 
 def find_by_token(c: Connection, token: str) -> ReportLink:
-    """The link of an address that leads to a report; raises LinkNotFound."""
+    """The valid link with this token; raises LinkNotFound."""
     row = c.execute(select(*_COLUMNS).where(report_link.c.token_sha256 == token_hash(token))).first()
-    found = None if row is None else ReportLink(**row._asdict())
-    if found is None or not found.is_open:
+    link = None if row is None else ReportLink(**row._asdict())
+    if link is None or not link.is_open:
         raise LinkNotFound
-    if c.execute(_WITH_MAKER.where(report_link.c.id == found.id, ~_may_share())).first():
+    if c.execute(_WITH_MAKER.where(report_link.c.id == link.id, ~_may_share())).first():
         raise LinkNotFound
-    return found
+    return link
 
 
 def note_opening(db: Database, link: ReportLink, address: str) -> None:
-    """Count and write down that somebody opened a link; once a minute, so that nobody fills the audit log."""
+    """Count and record the opening of a link, at most once a minute to limit the audit log."""
     if link.opened_at is not None and now() - link.opened_at < QUIET:
         return
     with db.write() as c:
@@ -197,14 +197,14 @@ def get(c: Connection, link_id: str) -> ReportLink:
 
 
 def of_session(c: Connection, session_id: str) -> list[ReportLink]:
-    """The links to all versions of a session's report, the newest first."""
+    """Links to all versions of a session's report, newest first."""
     query = select(*_COLUMNS).join(signed_report).where(signed_report.c.session_id == session_id)
     rows = c.execute(query.order_by(report_link.c.made_at.desc()))
     return [ReportLink(**row._asdict()) for row in rows]
 
 
 def _may_share() -> ColumnElement[bool]:
-    """Whether the maker of a link may read the report now, as a condition of `_WITH_MAKER`."""
+    """SQL condition for `_WITH_MAKER`: the creator of the link may currently read the report."""
     return user.c.active & user.c.role.in_(_READERS) & sees_patient(session.c.patient_id)
 
 

@@ -1,7 +1,7 @@
-"""Reports that somebody stands for: the therapist's text, signing, reopening, and what was signed.
+"""Signed reports: assessment text, signing, reopening, and stored documents.
 
-A signed report is a document of its own: its bytes are stored with their hash and stay, whatever is analysed
-again. While one is in force the text cannot be changed and no other is signed; who reopens it says why.
+A signed report is stored with its hash and unaffected by later analyses. While one is in force, the text
+cannot be changed and no other can be signed; reopening requires a reason.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class SignedReport:
 
     Parameters
     ----------
-    number : from 1. analysis_id : what it was made from. signed_by, reopened_by : names as they were then.
-    reopened_at, reopened_because : when and why it ceased to be in force, None of the one that is.
+    number : from 1. analysis_id : its analysis. signed_by, reopened_by : names at that time.
+    reopened_at, reopened_because : when and why it was reopened, None while in force.
     sha256 : of the document.
     """
 
@@ -57,26 +57,26 @@ class SignedReport:
 
     @property
     def in_force(self) -> bool:
-        """Nobody has reopened it."""
+        """Whether it has not been reopened."""
         return self.reopened_at is None
 
 
 @dataclass(frozen=True)
 class SignedDocuments:
-    """A signed report with what it is handed on in.
+    """A signed report with its files.
 
     Parameters
     ----------
-    files : its document, and its PDF where one was made, by name.
+    files : document, and PDF if rendered, by name.
     """
 
     report: SignedReport
     files: Mapping[str, Blob]
 
-    def describe(self, found: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
-        """What an archive or export of this analysis with these edits says of it, as JSON.
+    def describe(self, record: AnalysisRecord, edits: EditHistory) -> dict[str, Any]:
+        """Metadata for an archive or export of this analysis with these edits, as JSON.
 
-        `of_these_numbers` is False where another analysis was signed, or something was changed afterwards.
+        `of_these_numbers` is False if another analysis was signed or edits were made afterwards.
         """
         signed = self.report
         return {
@@ -85,13 +85,13 @@ class SignedDocuments:
             "signed_by": signed.signed_by,
             "signed_at": signed.signed_at.isoformat(timespec="seconds"),
             "sha256": signed.sha256,
-            "of_these_numbers": signed.analysis_id == found.id and not edits.changed_after(signed.signed_at),
+            "of_these_numbers": signed.analysis_id == record.id and not edits.changed_after(signed.signed_at),
         }
 
 
 @dataclass(frozen=True)
 class Signature:
-    """What a document says of who signed it."""
+    """Signature as printed in a document."""
 
     report_id: str
     number: int
@@ -100,13 +100,13 @@ class Signature:
 
 
 def read_assessment(c: Connection, session_id: str) -> str:
-    """The therapist's text, empty where there is none."""
+    """The therapist's assessment, empty if there is none."""
     query = select(assessment.c.content).where(assessment.c.session_id == session_id)
     return c.execute(query).scalar_one_or_none() or ""
 
 
 def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, content: str) -> None:
-    """Write the therapist's text; raises NotFound, Conflict report_signed, ServiceError text_too_long."""
+    """Set the therapist's assessment; raises NotFound, Conflict report_signed, ServiceError text_too_long."""
     sessions.get(c, session_id)
     require_open(c, session_id)
     text = content.strip()
@@ -124,20 +124,20 @@ def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, 
 
 def require_open(c: Connection, session_id: str) -> None:
     """Raise Conflict report_signed while a signed report of the session is in force."""
-    found = find_in_force(c, session_id)
-    if found is not None:
+    report = find_in_force(c, session_id)
+    if report is not None:
         raise Conflict(
             "report_signed",
-            f"Version {found.number} of this report is signed and locked. Reopen it first, with a reason.",
+            f"Version {report.number} of this report is signed and locked. Reopen it first, with a reason.",
         )
 
 
 def prepare_signature(c: Connection, session_id: str, report_id: str, name: str) -> Signature:
-    """What the next document is to say of its signature; raises NotFound, Conflict report_signed."""
+    """Signature to be printed in the next document; raises NotFound, Conflict report_signed."""
     sessions.get(c, session_id)
     require_open(c, session_id)
-    known = select(func.max(signed_report.c.number)).where(signed_report.c.session_id == session_id)
-    return Signature(report_id, (c.execute(known).scalar_one() or 0) + 1, name, now())
+    newest = select(func.max(signed_report.c.number)).where(signed_report.c.session_id == session_id)
+    return Signature(report_id, (c.execute(newest).scalar_one() or 0) + 1, name, now())
 
 
 def keep_signed(
@@ -149,15 +149,15 @@ def keep_signed(
     language: str,
     stored: Mapping[str, Blob],
 ) -> SignedReport:
-    """Keep a signed report with its documents.
+    """Store a signed report with its documents.
 
     Raises
     ------
     NotFound
-        the session. Conflict: somebody else signed meanwhile, report_signed or report_changed.
+        the session. Conflict: signed by another user in the meantime, report_signed or report_changed.
     """
-    after = prepare_signature(c, session_id, signature.report_id, signature.name)
-    if after.number != signature.number:
+    expected = prepare_signature(c, session_id, signature.report_id, signature.name)
+    if expected.number != signature.number:
         raise Conflict(
             "report_changed", "Somebody else has signed this report meanwhile. Load the page again."
         )
@@ -174,17 +174,17 @@ def keep_signed(
     )
     for name, blob in stored.items():
         _add_file(c, signature.report_id, name, blob)
-    found = get(c, signature.report_id)
-    detail = {"report_id": found.id, "version": found.number, "sha256": found.sha256}
+    report = get(c, signature.report_id)
+    detail = {"report_id": report.id, "version": report.number, "sha256": report.sha256}
     audit.record(c, actor, "signed_report.signed", "session", session_id, detail)
-    return found
+    return report
 
 
 def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str, name: str) -> SignedReport:
-    """Take a signed report out of force; it stays and can be read. Raises NotFound, Conflict, bad_value."""
-    found = get(c, report_id)
-    if not found.in_force:
-        raise Conflict("not_in_force", f"Version {found.number} has been reopened already.")
+    """Reopen a signed report, which remains readable. Raises NotFound, Conflict, bad_value."""
+    report = get(c, report_id)
+    if not report.in_force:
+        raise Conflict("not_in_force", f"Version {report.number} has been reopened already.")
     text = reason.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
         raise ServiceError("bad_value", f"A reason has 1 to {MOST_CHARACTERS:,} characters.")
@@ -193,8 +193,8 @@ def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str
         .where(signed_report.c.id == report_id)
         .values(reopened_by=name, reopened_at=now(), reopened_because=text)
     )
-    detail = {"report_id": report_id, "version": found.number}
-    audit.record(c, actor, "signed_report.reopened", "session", found.session_id, detail)
+    detail = {"report_id": report_id, "version": report.number}
+    audit.record(c, actor, "signed_report.reopened", "session", report.session_id, detail)
     return get(c, report_id)
 
 
@@ -207,18 +207,18 @@ def get(c: Connection, report_id: str) -> SignedReport:
 
 
 def of_session(c: Connection, session_id: str) -> list[SignedReport]:
-    """All versions, the newest first."""
+    """All versions, newest first."""
     query = _QUERY.where(signed_report.c.session_id == session_id)
     return [SignedReport(**row._asdict()) for row in c.execute(query.order_by(signed_report.c.number.desc()))]
 
 
 def find_in_force(c: Connection, session_id: str) -> SignedReport | None:
-    """The version that counts, None where nothing is signed or the last one was reopened."""
+    """The version in force, None if nothing is signed or the last one was reopened."""
     return next((r for r in of_session(c, session_id) if r.in_force), None)
 
 
 def find_documents(c: Connection, session_id: str) -> SignedDocuments | None:
-    """The version in force with its document and PDF; None where nothing is signed."""
+    """The version in force with its document and PDF; None if nothing is signed."""
     query = (
         select(*_NAMES, report_file.c.name, report_file.c.sha256, report_file.c.size)
         .join(report_file, report_file.c.report_id == signed_report.c.id)
@@ -235,7 +235,7 @@ def find_documents(c: Connection, session_id: str) -> SignedDocuments | None:
 
 
 def find_file(c: Connection, report_id: str, name: str) -> tuple[str, str | None]:
-    """Space and sha256 of a document of a signed report, None where it was not made; raises NotFound."""
+    """Space and sha256 of a document of a signed report, None if it was not rendered; raises NotFound."""
     space = select(session.c.patient_id).where(session.c.id == get(c, report_id).session_id)
     query = select(report_file.c.sha256).where(
         report_file.c.report_id == report_id, report_file.c.name == name
@@ -244,7 +244,7 @@ def find_file(c: Connection, report_id: str, name: str) -> tuple[str, str | None
 
 
 def read_document(c: Connection, blobs: BlobStore, report_id: str, name: str = DOCUMENT) -> bytes:
-    """A document that was stored at signing, verified; raises NotFound, IntegrityError."""
+    """Read and verify a document stored at signing; raises NotFound, IntegrityError."""
     space, sha256 = find_file(c, report_id, name)
     if sha256 is None:
         raise NotFound("document of signed report", report_id)
@@ -252,7 +252,7 @@ def read_document(c: Connection, blobs: BlobStore, report_id: str, name: str = D
 
 
 def keep_pdf(c: Connection, report_id: str, blob: Blob) -> None:
-    """Keep the PDF of a signed report; the first that was made stays. Raises NotFound."""
+    """Store the PDF of a signed report, unless one is stored. Raises NotFound."""
     if find_file(c, report_id, PDF)[1] is None:
         _add_file(c, report_id, PDF, blob)
 

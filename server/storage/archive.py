@@ -1,4 +1,4 @@
-"""One file that holds many: a tar written and read as a stream, encrypted with age where a key is given.
+"""Streaming tar archives, encrypted with age if a key is given.
 
     with fs.IncomingFile(folder) as file:
         with write_archive(file, key) as archive:
@@ -33,23 +33,23 @@ _SECRET: Final = "AGE-SECRET-KEY-1"  # noqa: S105 - how a private key of age beg
 
 
 class BackupFileError(Exception):
-    """The archive or its key cannot be used; the message says why and what to do."""
+    """The archive or its key cannot be used; the message gives reason and remedy."""
 
 
 class Sink(Protocol):
-    """What an archive is written into."""
+    """Output of an archive."""
 
     def write(self, data: bytes) -> object:
-        """Take all of the bytes."""
+        """Write all of the bytes."""
 
 
 @dataclass(frozen=True)
 class ClinicKey:
-    """The clinic's key pair of age.
+    """The clinic's age key pair.
 
     Parameters
     ----------
-    public : to encrypt with. private : to decrypt with; None = it is kept elsewhere.
+    public : for encryption. private : for decryption; None = stored elsewhere.
     """
 
     public: pyrage.x25519.Recipient
@@ -57,12 +57,14 @@ class ClinicKey:
 
     @property
     def opens(self) -> bool:
-        """Whether what it encrypts can be read with it."""
+        """Whether it includes the private key required for decryption."""
         return self.private is not None
 
 
 def make_key(path: Path) -> str:
-    """Write a new key pair for its owner only and return the public one; raise BackupFileError over one."""
+    """Write a new key pair, readable by its owner only; return the public one; BackupFileError if it
+    exists.
+    """
     if path.exists():
         raise BackupFileError(f"{path} exists; a key is never written over another one.")
     private = pyrage.x25519.Identity.generate()
@@ -72,18 +74,18 @@ def make_key(path: Path) -> str:
 
 
 def read_key(path: Path) -> ClinicKey:
-    """Read a key file: a private key of age, or a public one (age1…), which only encrypts; # begins a note.
+    """Read a private age key, or a public one (age1…) for encryption only; # starts a comment.
 
     Raises
     ------
     BackupFileError
-        there is no such file, or it holds no key.
+        the file does not exist or contains no key.
     """
     try:
         lines = [line.strip() for line in path.read_text("utf-8").splitlines()]
     except (OSError, UnicodeDecodeError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise BackupFileError(f"The key {path} cannot be read ({why}).") from error
+        reason = getattr(error, "strerror", None) or error
+        raise BackupFileError(f"The key {path} cannot be read ({reason}).") from error
     text = next((line for line in lines if line and not line.startswith("#")), "")
     try:
         if text.startswith(_SECRET):
@@ -98,13 +100,13 @@ def read_key(path: Path) -> ClinicKey:
 
 
 class ArchiveWriter:
-    """An archive that is being written."""
+    """An archive being written."""
 
     def __init__(self, tar: tarfile.TarFile) -> None:
         self._tar = tar
 
     def add(self, name: str, source: BinaryIO, size: int) -> str:
-        """Append the first `size` bytes of a source, which has them, and return their sha256."""
+        """Append the first `size` bytes of a source and return their sha256."""
         member = tarfile.TarInfo(name)
         member.size, member.mode = size, 0o600
         reader = _HashingReader(source)
@@ -114,13 +116,13 @@ class ArchiveWriter:
 
 
 class ArchivedFile:
-    """The content of one file of an archive that is being read."""
+    """Content of one file of an archive being read."""
 
     def __init__(self, content: IO[bytes], archive: Path) -> None:
         self._content, self._archive = content, archive
 
     def read(self, size: int) -> bytes:
-        """The next bytes, none at the end; raises BackupFileError where the archive is cut."""
+        """The next bytes, empty at the end; raises BackupFileError if the archive is truncated."""
         try:
             return self._content.read(size)
         except (tarfile.TarError, EOFError) as error:
@@ -129,7 +131,7 @@ class ArchivedFile:
 
 @contextlib.contextmanager
 def write_archive(sink: Sink, key: ClinicKey | None = None) -> Iterator[ArchiveWriter]:
-    """Write an archive into a sink; whole only when the block ends without an error."""
+    """Context that writes an archive to a sink; complete only if it ends without an error."""
     if key is None:
         with tarfile.open(fileobj=sink, mode="w|", format=tarfile.PAX_FORMAT) as tar:  # type: ignore[call-overload]
             yield ArchiveWriter(tar)
@@ -155,13 +157,13 @@ def write_archive(sink: Sink, key: ClinicKey | None = None) -> Iterator[ArchiveW
 
 
 def read_archive(path: Path, key: ClinicKey | None) -> Generator[tuple[str, int, ArchivedFile], None, None]:
-    """Every file of an archive in its order: name, size in bytes, content to be read before the next one.
+    """Yield name, size in bytes and content of every file in order; read the content before the next file.
 
     Raises
     ------
     BackupFileError
-        it is none, is damaged or cut, or needs another key. Seen at the latest at its end: nothing of it may
-        be used before.
+        not an archive, damaged, truncated, or encrypted with another key. Detected at the end at the latest:
+        do not use any content before.
     """
     with path.open("rb") as file:
         encrypted = file.read(len(_MAGIC)) == _MAGIC
@@ -229,7 +231,7 @@ def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFi
 
 
 class _HashingReader:
-    """Hashes what is read through it."""
+    """Reader that hashes the data passing through."""
 
     def __init__(self, source: BinaryIO) -> None:
         self._source, self._hash = source, hashlib.sha256()
@@ -245,7 +247,7 @@ class _HashingReader:
 
 
 class _Counting:
-    """A sink that says how many bytes it took, which age asks for."""
+    """Sink that returns the number of bytes written, as age requires."""
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
@@ -260,11 +262,11 @@ class _Counting:
         return len(data)
 
     def flush(self) -> None:
-        """Nothing waits here."""
+        """No-op, as nothing is buffered."""
 
 
 class _Background:
-    """A thread that runs `work` and then closes its end of a pipe."""
+    """Thread that runs `work` and then closes its end of a pipe."""
 
     def __init__(self, work: Callable[[], object], end: BinaryIO) -> None:
         self.error: BaseException | None = None
@@ -273,7 +275,7 @@ class _Background:
         self._thread.start()
 
     def end(self) -> None:
-        """Wait until it is done."""
+        """Wait for the thread."""
         self._thread.join()
 
     def _run(self) -> None:

@@ -1,7 +1,7 @@
-"""One folder of compiled filters per user, installation and version of the filters, shared by all processes.
+"""Shared folder of compiled filters per user, installation and version.
 
-numba compiles a filter at its first call, which takes up to a minute for all of them, and reads it from this
-folder ever after: command line, web server, workers, live estimators, demo and tests use the same one.
+numba compiles a filter at its first call, up to a minute for all of them, and later loads it from this
+folder, which is shared by command line, web server, workers, live estimators, demo and tests.
 """
 
 from __future__ import annotations
@@ -30,35 +30,34 @@ _IMPORTED = re.compile(
 
 
 def share_compile_cache(fallback: Path) -> Path:
-    """Choose the folder for this process and all it starts; call it before numba is imported.
+    """Select the folder for this process and its children; call before numba is imported.
 
     Parameters
     ----------
-    fallback : folder taken where the user's cache folder cannot be written (made when needed).
+    fallback : folder used if the user's cache folder is not writable (created if needed).
 
     Returns
     -------
-    The folder, which is now `NUMBA_CACHE_DIR` of this process. A folder that the environment already names is
-    kept as it is.
+    The folder, now set as `NUMBA_CACHE_DIR` of this process unless the variable was already set.
     """
-    given = os.environ.get(VARIABLE)
-    folder = Path(given) if given else find_compile_cache(os.environ, fallback)
+    configured = os.environ.get(VARIABLE)
+    folder = Path(configured) if configured else find_compile_cache(os.environ, fallback)
     os.environ[VARIABLE] = str(folder)
     return folder
 
 
 def has_compiled_filters() -> bool:
-    """Whether the folder of this process holds filters already, so that a start will not wait for them."""
+    """Whether the folder of this process already contains filters, so that startup need not wait for them."""
     return any(Path(os.environ[VARIABLE]).rglob("*.nbi"))
 
 
 def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
-    """Return the user's folder for this installation's filters, made if need be; `fallback` if it cannot be.
+    """Return the user's folder for this installation's filters, created if necessary; otherwise `fallback`.
 
     Parameters
     ----------
     environment : `XDG_CACHE_HOME` and `HOME` are read from it.
-    fallback : folder taken where the user's cache folder belongs to somebody else or cannot be written.
+    fallback : folder used if the user's cache folder has another owner or is not writable.
     """
     version = _name_installation(Path(core.__file__ or "").parent)
     home = environment.get("XDG_CACHE_HOME") or os.path.join(environment.get("HOME", "/"), ".cache")  # noqa: PTH118
@@ -70,21 +69,21 @@ def find_compile_cache(environment: Mapping[str, str], fallback: Path) -> Path:
 
 
 def _name_installation(package: Path) -> str:
-    """Return the fingerprint of the filters and of where they lie.
+    """Return the fingerprint of the filters and their location.
 
-    numba finds a compiled filter by the path of its source. In a folder of several installations of a version
-    those of another would pass for ours: nobody would be told of the wait, and each process would compile by
-    itself, one filter after another.
+    numba identifies a compiled filter by the path of its source. If several installations of a version shared
+    a folder, filters of another would appear to be present: startup would not announce the wait, and each
+    process would compile on its own, one filter after another.
     """
     place = hashlib.sha256(os.fsencode(package.resolve())).hexdigest()[:4]
     return f"{fingerprint_filters(package)}-{place}"
 
 
 def fingerprint_filters(package: Path) -> str:
-    """Return 12 hexadecimal digits that change with every source a compiled filter is made of.
+    """Return 12 hexadecimal digits that change with any source of a compiled filter.
 
-    numba looks at the time of one file only; a filter is compiled together with the functions and constants
-    of other modules, so every module that can be reached from a module with a filter counts.
+    numba checks the modification time of one file only, although a filter is compiled together with functions
+    and constants of other modules; so all modules reachable from a module with a filter are included.
 
     Parameters
     ----------
@@ -112,14 +111,14 @@ def _parts(path: Path, package: Path) -> tuple[str, ...]:
 
 
 def _imports(source: str) -> Iterator[str]:
-    """Names that may be modules of core: the module after `from` and what is taken from it."""
+    """Names that may be modules of core: the module after `from` and the names imported from it."""
     for module, lines, line in _IMPORTED.findall(source):
         yield module
         yield from (f"{module}.{name.strip()}" for name in (lines or line).split(","))
 
 
 def _is_ours(folder: Path) -> bool:
-    """Make the folder; whether it is there, belongs to this user and can be written."""
+    """Create the folder; return whether it exists, belongs to this user and is writable."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         # somebody else's folder may hold somebody else's machine code
@@ -134,6 +133,6 @@ def _is_ours(folder: Path) -> bool:
 def _remove_old_versions(folder: Path) -> None:
     limit = time.time() - KEEP_S
     with suppress(OSError):
-        for other in folder.parent.glob("filters-*"):
-            if other != folder and other.stat().st_mtime < limit:
-                shutil.rmtree(other, ignore_errors=True)
+        for old_folder in folder.parent.glob("filters-*"):
+            if old_folder != folder and old_folder.stat().st_mtime < limit:
+                shutil.rmtree(old_folder, ignore_errors=True)

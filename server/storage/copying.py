@@ -1,6 +1,6 @@
-"""All rows of one database into another of the same revision, whatever the engines: moves and backups.
+"""Copies all rows between databases of the same revision, whatever their engines: moves and backups.
 
-Tables are those that the databases have, not those of this version: before an upgrade they are older.
+Tables are read from the databases rather than from this version, as they may be older before an upgrade.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _ALEMBIC = "alembic_version"
 
 
 def copy_rows(source: Connection, target: Connection) -> bool:
-    """Copy every row in the transaction of `target`; False, and nothing was copied, when it holds any."""
+    """Copy all rows in the transaction of `target`; False without copying if it contains any."""
     theirs, ours = _reflect(source), _reflect(target)
     tables = [ours.tables[table.name] for table in theirs.sorted_tables if table.name != _ALEMBIC]
     if any(target.execute(select(func.count()).select_from(table)).scalar_one() for table in tables):
@@ -37,10 +37,10 @@ def _copy_table(source: Connection, old: Table, target: Connection, new: Table) 
 
 
 def _reflect(c: Connection) -> MetaData:
-    found = MetaData()
-    found.reflect(c)
-    for table in found.tables.values():
+    reflected = MetaData()
+    reflected.reflect(c)
+    for table in reflected.tables.values():
         for column in table.columns:
             if isinstance(column.type, JSON):
                 column.type = Json  # no value is NULL, not the word null
-    return found
+    return reflected

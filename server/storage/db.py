@@ -1,11 +1,11 @@
-"""The database, an SQLite file or a PostgreSQL server: two views on it, the same on both.
+"""Read and write access to the database, the same for an SQLite file and a PostgreSQL server.
 
     db = Database(settings.database_source)
-    with db.write() as c:  c.execute(insert(patient).values(...))   # alone; commit, or rollback
-    with db.read() as c:   c.execute(select(patient)).all()         # one snapshot, writing refused
+    with db.write() as c:  c.execute(insert(patient).values(...))   # exclusive; commit, or rollback
+    with db.read() as c:   c.execute(select(patient)).all()         # one snapshot, read-only
     db.ask(select(patient))                                         # the rows of a single statement
 
-Statements of one engine stand in sqlite_file.py and postgres.py, and nowhere else.
+Engine-specific statements are confined to sqlite_file.py and postgres.py.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Source = Path | str
 
 
 class Database:
-    """Both views on one database; opening neither creates tables nor migrates (storage/migrate.py does)."""
+    """Read and write access to one database; neither creates tables nor migrates (see storage/migrate.py)."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -40,29 +40,31 @@ class Database:
 
     @contextmanager
     def write(self) -> Iterator[Connection]:
-        """One transaction that holds the write lock from its first statement; commits at the block's end."""
+        """Transaction that holds the write lock from its first statement; commits at the end of the
+        context.
+        """
         with self._turn, self._writer.begin() as connection:
             yield connection
 
     @contextmanager
     def read(self) -> Iterator[Connection]:
-        """One snapshot; every statement of the block sees the same state, writing raises DBAPIError."""
+        """Snapshot in which every statement sees the same state; writing raises DBAPIError."""
         with self._reader.begin() as connection:
             yield connection
 
     def ask(self, query: Select[Any]) -> Sequence[Row[Any]]:
-        """The rows of one statement; on PostgreSQL a word to the server instead of three."""
+        """Rows of a single statement; on PostgreSQL in one round trip instead of three."""
         with self._asker.connect() as connection:
             return connection.execute(query).all()
 
     @contextmanager
     def watch(self) -> Iterator[ChangeWatch]:
-        """Tell cheaply whether anybody has committed since it was last asked."""
+        """Context with a cheap check for commits since the previous check."""
         with self._engine.watch() as ask:
             yield ChangeWatch(ask)
 
     def problems(self) -> list[str]:
-        """Complaints of the engine's own checks."""
+        """Errors reported by the engine's own checks."""
         with self.read() as c:
             return self._engine.check(c)
 
@@ -72,14 +74,14 @@ class Database:
             self._engine.probe(c)
 
     def fold(self) -> bool:
-        """Remove from the files what was deleted from the tables; False = it is still being read."""
+        """Physically remove deleted data from the files; False = readers prevent it."""
         return self._engine.fold()
 
     @contextmanager
     def serve(self, node: str) -> Iterator[bool]:
-        """Be a web server on a PostgreSQL database: alone, or with a name beside others; False = not now.
+        """Register as web server of a PostgreSQL database, alone or under a name; False = not possible now.
 
-        Files have their lock.
+        For SQLite files the lock file serves this purpose.
         """
         if isinstance(self._engine, PostgresServer):
             with self._engine.serve(node) as may_serve:
@@ -89,7 +91,7 @@ class Database:
 
     @contextmanager
     def do_alone(self, duty: str) -> Iterator[bool]:
-        """Do a periodic duty (a word) while no other program does; False = one does. A file: always True."""
+        """Run a periodic task exclusively; False = another program runs it. Always True for SQLite files."""
         if isinstance(self._engine, PostgresServer):
             with self._engine.do_alone(duty) as is_mine:
                 yield is_mine
@@ -97,27 +99,27 @@ class Database:
             yield True
 
     def read_clock(self) -> float | None:
-        """Time of the database's host, seconds since 1970 UTC; None = it is this host."""
+        """Time of the database host, seconds since 1970 UTC; None = it is this host."""
         if not isinstance(self._engine, PostgresServer):
             return None
         with self.read() as c:
             return self._engine.read_clock(c)
 
     def close(self) -> None:
-        """Close all connections; the last one to leave folds SQLite's write-ahead log into the file."""
+        """Close all connections; the last one merges SQLite's write-ahead log into the file."""
         self._reader.dispose()
         self._writer.dispose()
 
 
 class ChangeWatch:
-    """Whether the database has changed, without reading any table."""
+    """Detects changes of the database without reading a table."""
 
     def __init__(self, ask: Callable[[], object]) -> None:
         self._ask = ask
         self._seen: object = None
 
     def has_changed(self) -> bool:
-        """True at the first call and whenever another connection has committed since the last one."""
+        """True at the first call and after a commit of another connection since the previous call."""
         word = self._ask()
         changed = word != self._seen
         self._seen = word
@@ -125,20 +127,20 @@ class ChangeWatch:
 
 
 def engine_of(source: Source) -> SqliteFile | PostgresServer:
-    """Return what knows the engine of this database; raises ModuleNotFoundError without its driver."""
+    """Return the adapter for the engine of this database; raises ModuleNotFoundError without its driver."""
     return SqliteFile(source) if isinstance(source, Path) else PostgresServer(source)
 
 
 def highest_number(connection: Connection, table: str) -> int:
-    """The greatest number that a table which never gives one twice has given, 0 = none yet.
+    """Greatest number issued by a table that never reuses numbers, 0 = none yet.
 
-    On PostgreSQL only for numbers that it gives itself; of those that we give the greatest that is there.
+    On PostgreSQL this holds for generated numbers; for others it is the greatest one present.
     """
     return _engine_behind(connection).highest_number(connection, table)
 
 
 def raise_number(connection: Connection, table: str, number: int) -> None:
-    """Let a table that never gives a number twice go on after this one, at least 1."""
+    """Make a table that never reuses numbers continue after this one, at least 1."""
     _engine_behind(connection).raise_number(connection, table, number)
 
 

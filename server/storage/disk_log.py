@@ -1,8 +1,8 @@
-"""One log line when the disk refuses to be written, and one when it works again.
+"""One log line when writing to disk fails, and one when it works again.
 
 disk = DiskLog(log)
-disk.note_refusal(error, "the live logs")      # of every failed write; other errors are logged in full
-disk.note_success()                            # of every write that succeeded
+disk.note_refusal(error, "the live logs")      # for every failed write; other errors are logged in full
+disk.note_success()                            # for every successful write
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ QUIET_S: Final = 60.0
 
 
 class DiskLog:
-    """Reports a disk that refuses, for one kind of writes.
+    """Reports disk failures for one kind of writes.
 
     Parameters
     ----------
-    logger : where the lines go. clock : seconds.
+    logger : receives the lines. clock : seconds.
     """
 
     def __init__(self, logger: logging.Logger, clock: Callable[[], float] = time.monotonic) -> None:
@@ -33,27 +33,27 @@ class DiskLog:
         self._since: float | None = None
         self._quiet_until: float | None = None
 
-    def note_refusal(self, error: BaseException, what: str) -> None:
-        """Report a failed write, once until writes succeed; an error of another kind has its traceback.
+    def note_refusal(self, error: BaseException, description: str) -> None:
+        """Report a failed write, once until writes succeed; other errors are logged with a traceback.
 
         Parameters
         ----------
-        what : cannot be written, for the log.
+        description : description of the written object, for the log.
         """
         refusal = refusal_of(error)
-        why = refusal.value if refusal is not None else getattr(error, "strerror", None)
-        if why is None:
-            self._log.error("%s cannot be written", what, exc_info=error)
+        reason = refusal.value if refusal is not None else getattr(error, "strerror", None)
+        if reason is None:
+            self._log.error("%s cannot be written", description, exc_info=error)
             return
         with self._guard:
-            at = self._clock()
-            if self._since is not None or (self._quiet_until is not None and at < self._quiet_until):
+            time = self._clock()
+            if self._since is not None or (self._quiet_until is not None and time < self._quiet_until):
                 return
-            self._since, self._quiet_until = at, at + QUIET_S
-        self._log.error("%s cannot be written (%s); not repeated until writes succeed", what, why)
+            self._since, self._quiet_until = time, time + QUIET_S
+        self._log.error("%s cannot be written (%s); not repeated until writes succeed", description, reason)
 
     def note_success(self) -> None:
-        """Report that writes succeed again, if a refusal was reported."""
+        """Report that writes succeed again, if a failure was reported."""
         if self._since is None:
             return
         with self._guard:

@@ -1,12 +1,12 @@
-"""Single values encrypted with AES-256-GCM, each bound to its row and field, under a key kept in a file.
+"""Encryption of single values with AES-256-GCM, bound to row and field, using a key file.
 
-    make_keys(path)                                   # once, on purpose; reading never makes one
+    make_keys(path)                                   # once, explicitly; reading never creates one
     keys = read_keys(path)
     sealed = keys.seal("Erika Muster", row_id, "name")
-    keys.open(sealed, row_id, "name")                 # of another row or field: ValueUnreadable
+    keys.open(sealed, row_id, "name")                 # for another row or field: ValueUnreadable
 
-A file holds one key; while keys change it holds two, the new one first. A sealed value says by which key it
-was sealed, and hides its text's length but for steps of 64 bytes.
+A file contains one key, or two during a key change, the new one first. An encrypted value names its key and
+hides the length of the text up to multiples of 64 bytes.
 """
 
 from __future__ import annotations
@@ -31,39 +31,39 @@ _HEAD: Final = len(_VERSION) + _NAME_BYTES + _NONCE_BYTES
 
 
 class KeyUnusable(SagittalError):  # noqa: N818 - what is the matter with the key
-    """The key of encrypted values is not there, or is no key; the message says what to do."""
+    """The key of encrypted values is missing or invalid; the message contains a remedy."""
 
     status = 503
 
 
 class ValueUnreadable(SagittalError):  # noqa: N818 - what is the matter with the value
-    """A value was sealed by another key, was changed, or belongs to another row or field."""
+    """A value was encrypted with another key, was modified, or belongs to another row or field."""
 
     status = 503
 
 
 @dataclass(frozen=True)
 class FieldKeys:
-    """Keys by their names of 8 bytes; the first one seals, all of them open."""
+    """Keys by their names of 8 bytes; the first one encrypts, all of them decrypt."""
 
     keys: dict[bytes, bytes] = field(repr=False)
 
     @property
     def name(self) -> str:
-        """Name of the key that seals, 16 hex digits."""
+        """Name of the encrypting key, 16 hex digits."""
         return next(iter(self.keys)).hex()
 
     def has(self, name: str) -> bool:
-        """Whether a key is among them."""
+        """Whether a key is included."""
         return bytes.fromhex(name) in self.keys
 
     def only(self, name: str) -> FieldKeys:
-        """One of the keys, alone."""
-        wanted = bytes.fromhex(name)
-        return FieldKeys({wanted: self.keys[wanted]})
+        """A single key of the set."""
+        key_name = bytes.fromhex(name)
+        return FieldKeys({key_name: self.keys[key_name]})
 
     def seal(self, text: str, row_id: str, name: str) -> bytes:
-        """Encrypt a text, which holds no NUL, for one field of one row."""
+        """Encrypt a text without NUL for one field of one row."""
         key_name, key = next(iter(self.keys.items()))
         plain = text.encode()
         plain += bytes(-len(plain) % _STEP)
@@ -71,7 +71,7 @@ class FieldKeys:
         return _VERSION + key_name + nonce + AESGCM(key).encrypt(nonce, plain, _bind(row_id, name))
 
     def open(self, sealed: bytes, row_id: str, name: str) -> str:
-        """Decrypt what was sealed for this field of this row; raises ValueUnreadable."""
+        """Decrypt a value of this field and row; raises ValueUnreadable."""
         key_name, nonce = sealed[1 : 1 + _NAME_BYTES], sealed[1 + _NAME_BYTES : _HEAD]
         if sealed[:1] != _VERSION or len(sealed) < _HEAD + _TAG_BYTES:
             raise ValueUnreadable("identity_damaged", f"The {say_field(name)} is damaged. {_MEND}")
@@ -92,7 +92,7 @@ class FieldKeys:
 
 
 def make_keys(path: Path) -> str:
-    """Write a file with a new key for its owner only and return its name; KeyUnusable over a file."""
+    """Write a file with a new key, readable by its owner only; return its name; KeyUnusable if it exists."""
     if path.exists():
         raise KeyUnusable("identity_key_exists", f"{path} exists; a key is never written over another one.")
     key = os.urandom(32)
@@ -101,18 +101,18 @@ def make_keys(path: Path) -> str:
 
 
 def add_key(path: Path) -> None:
-    """Put a new key before those of a file: it seals from now on. Raises KeyUnusable."""
+    """Add a new key to a file, which encrypts from now on. Raises KeyUnusable."""
     # a link leads to where the file is kept
     _write(path.resolve(), [os.urandom(32), *read_keys(path).keys.values()])
 
 
 def drop_other_keys(path: Path, name: str) -> None:
-    """Leave only one of the keys of a file; raises KeyUnusable."""
+    """Remove all keys of a file except one; raises KeyUnusable."""
     _write(path.resolve(), list(read_keys(path).only(name).keys.values()))
 
 
 def read_keys(path: Path) -> FieldKeys:
-    """Read the keys of a file; raises KeyUnusable where it is not there or is none of ours."""
+    """Read the keys of a file; raises KeyUnusable if it is missing or invalid."""
     try:
         lines = [line.strip() for line in path.read_text("ascii").splitlines()]
     except FileNotFoundError as error:
@@ -124,9 +124,9 @@ def read_keys(path: Path) -> FieldKeys:
         raise KeyUnusable(
             "identity_key_missing", "The key of patients' names cannot be read. The operator puts it right."
         ) from error
-    found = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
-    keys = [bytes.fromhex(one[1]) for one in found if one is not None]
-    if not keys or len(keys) != len(found):
+    matches = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
+    keys = [bytes.fromhex(one[1]) for one in matches if one is not None]
+    if not keys or len(keys) != len(matches):
         raise KeyUnusable(
             "identity_key_wrong",
             "The file of the key of patients' names holds no such key. The operator puts the right one back.",
@@ -138,7 +138,7 @@ _MEND: Final = "The operator runs `sagittal check`, and takes it from a backup o
 
 
 def say_field(name: str) -> str:
-    """What a field is called in a sentence."""
+    """Name of a field for use in a sentence."""
     return {"born_on": "date of birth", "contact": "address and telephone"}.get(name, name.replace("_", " "))
 
 

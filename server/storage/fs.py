@@ -1,9 +1,9 @@
 """The only module of the server that opens files for writing.
 
-A file appears whole or not at all, also after a power cut: temporary file → fsync → rename → fsync of the
-folder (measured: 25 kills, 0 broken files; the enumerated power-loss model: 18 states, 0 violations, without
-the file's fsync 3, without the folder's 2). Every effect goes through `system`, which tests replace to inject
-faults.
+A file appears completely or not at all, even after a power failure: temporary file → fsync → rename → fsync
+of the folder (measured: 25 kills, 0 broken files; the enumerated power-loss model: 18 states, 0 violations,
+without the file's fsync 3, without the folder's 2). All side effects use `system`, which tests replace to
+inject faults.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from typing import BinaryIO, Self, cast
 
 
 class System:
-    """The operating system's calls that change something; the one seam for fault injection."""
+    """Operating system calls with side effects; the single seam for fault injection."""
 
     def open(self, path: Path, flags: int) -> int:
-        """Open as os.open does; new files are readable by their owner only."""
+        """Open like os.open; new files are readable by their owner only."""
         return os.open(path, flags | os.O_CLOEXEC, 0o600)
 
     def write(self, fd: int, data: bytes | memoryview) -> int:
-        """Write some of the bytes and return how many."""
+        """Write some of the bytes and return their number."""
         return os.write(fd, data)
 
     def fsync(self, fd: int) -> None:
-        """Wait until the content (of a folder: its names) is on the disk."""
+        """Wait until the content (of a folder: its entries) is on disk."""
         os.fsync(fd)
 
     def truncate(self, fd: int, size: int) -> None:
-        """Cut a file to its first `size` bytes."""
+        """Truncate a file to its first `size` bytes."""
         os.ftruncate(fd, size)
 
     def close(self, fd: int) -> None:
@@ -45,7 +45,7 @@ class System:
         os.close(fd)
 
     def replace(self, source: Path, target: Path) -> None:
-        """Rename over whatever is there."""
+        """Rename, replacing an existing file."""
         os.replace(source, target)  # noqa: PTH105 - the call itself is what tests count
 
     def unlink(self, path: Path) -> None:
@@ -53,11 +53,11 @@ class System:
         path.unlink(missing_ok=True)
 
     def mkdir(self, path: Path) -> None:
-        """Make one folder for its owner only."""
+        """Create one folder for its owner only."""
         path.mkdir(mode=0o700, exist_ok=True)
 
     def chmod(self, path: Path, mode: int) -> None:
-        """Change who may do what with a file."""
+        """Change the permissions of a file."""
         path.chmod(mode)
 
     def rmdir(self, path: Path) -> None:
@@ -69,7 +69,7 @@ system = System()
 
 
 class SizeLimitError(Exception):
-    """More bytes came than were allowed; nothing is kept."""
+    """More bytes were received than allowed; nothing is stored."""
 
     def __init__(self, limit: int) -> None:
         super().__init__(f"more than {limit} bytes")
@@ -77,14 +77,14 @@ class SizeLimitError(Exception):
 
 
 class IncomingFile:
-    """A file that is being written under a temporary name; counts and hashes what passes.
+    """A file being written under a temporary name; counts and hashes its content.
 
     Use as a context manager; leaving it without `keep` removes the file.
 
     Parameters
     ----------
-    folder : where the temporary file lives; the same file system as every target.
-    limit : most bytes that will be taken, None = no limit.
+    folder : for the temporary file; on the same file system as every target.
+    limit : maximum number of bytes, None = no limit.
     """
 
     def __init__(self, folder: Path, limit: int | None = None) -> None:
@@ -105,19 +105,19 @@ class IncomingFile:
         return self._hash.hexdigest()
 
     def write(self, data: bytes) -> None:
-        """Append bytes; raise SizeLimitError beyond the limit."""
+        """Append bytes; raise SizeLimitError if the limit is exceeded."""
         if self._fd is None:
             raise ValueError("The file is already closed.")
         if self._limit is not None and self.size + len(data) > self._limit:
             raise SizeLimitError(self._limit)
-        rest = memoryview(data)
-        while rest:
-            rest = rest[system.write(self._fd, rest) :]
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[system.write(self._fd, remaining) :]
         self._hash.update(data)
         self.size += len(data)
 
     def keep(self, target: Path) -> None:
-        """Give the file its name; when this returns, name and content survive a power cut."""
+        """Rename the file to its final name, durably."""
         if self._fd is None:
             raise ValueError("The file is already closed.")
         system.fsync(self._fd)
@@ -145,11 +145,11 @@ class IncomingFile:
 
 
 class AppendOnlyFile:
-    """A file that only grows at its end; its first `size` bytes are whole appends.
+    """A file that is only appended to; its first `size` bytes are complete appends.
 
     Parameters
     ----------
-    path : must exist. size : bytes to go on after; what lies behind them is cut off at the first append.
+    path : must exist. size : valid bytes; the file is truncated to them at the first append.
     """
 
     def __init__(self, path: Path, size: int) -> None:
@@ -158,30 +158,30 @@ class AppendOnlyFile:
         self._fd: int | None = system.open(path, os.O_WRONLY | os.O_APPEND)
 
     def append(self, data: bytes) -> None:
-        """Write behind the last append; not on the disk before `sync`. After an OSError nothing was added."""
+        """Append data, durable only after `sync`. After an OSError nothing has been added."""
         fd = self._descriptor()
         if self._reach != self.size:  # a torn append may be there, from before a crash or a full disk
             self.cut(self.size)
         self._reach = None
-        rest = memoryview(data)
-        while rest:
-            rest = rest[system.write(fd, rest) :]
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[system.write(fd, remaining) :]
         self.size += len(data)
         self._reach = self.size
 
     def sync(self) -> None:
-        """Wait until all appends survive a power cut."""
+        """Wait until all appends are durable."""
         system.fsync(self._descriptor())
 
     def cut(self, size: int) -> None:
-        """Forget everything behind the first `size` bytes."""
+        """Truncate to the first `size` bytes."""
         self._reach = None
         self.size = size
         system.truncate(self._descriptor(), size)
         self._reach = size
 
     def close(self) -> None:
-        """Let go of the file; closing twice is fine."""
+        """Close the file; may be called twice."""
         if self._fd is not None:
             fd, self._fd = self._fd, None
             system.close(fd)
@@ -193,19 +193,19 @@ class AppendOnlyFile:
 
 
 def write_file(path: Path, content: bytes) -> None:
-    """Write a whole file so that its name never shows a part of it."""
+    """Write a complete file atomically."""
     with IncomingFile(path.parent) as incoming:
         incoming.write(content)
         incoming.keep(path)
 
 
 def open_scratch(folder: Path) -> BinaryIO:
-    """Open a file without a name, to be written and read; it is gone when it is closed, or its process."""
+    """Open an anonymous temporary file, which disappears when it is closed or its process ends."""
     return cast("BinaryIO", tempfile.TemporaryFile(dir=folder))
 
 
 def sync_file(path: Path) -> None:
-    """Make a file that somebody else wrote (SQLite) survive a power cut, its name too."""
+    """Make a file written by other code (SQLite) durable, including its name."""
     fd = system.open(path, os.O_RDONLY)
     try:
         system.fsync(fd)
@@ -215,7 +215,7 @@ def sync_file(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make the names in a folder survive a power cut."""
+    """Make the entries of a folder durable."""
     fd = system.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         system.fsync(fd)
@@ -224,7 +224,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and its parents, durably, for their owner only; what exists is left as it is."""
+    """Durably create a folder and its parents for their owner only; existing ones are unchanged."""
     if folder.is_dir():
         return
     make_folder(folder.parent)
@@ -233,9 +233,9 @@ def make_folder(folder: Path) -> None:
 
 
 def move_file(source: Path, target: Path) -> None:
-    """Give a file another name on the same file system, over whatever is there.
+    """Rename a file within the same file system, replacing an existing one.
 
-    A power cut leaves it under one of both names; it is surely under the new one after `sync_folder` of both
+    After a power failure it has one of both names; the new one is guaranteed after `sync_folder` of both
     folders, which the caller does once for many files.
     """
     make_folder(target.parent)
@@ -243,9 +243,9 @@ def move_file(source: Path, target: Path) -> None:
 
 
 def keep_private(path: Path) -> None:
-    """Make an empty file for its owner only; take everybody else's rights to one that exists.
+    """Create an empty file for its owner only, or restrict the permissions of an existing one.
 
-    What exists is not opened: closing it would end the locks that SQLite has on it in this process.
+    An existing file is not opened: closing it would release SQLite's locks on it in this process.
     """
     try:
         system.close(system.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL))
@@ -256,12 +256,12 @@ def keep_private(path: Path) -> None:
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file; gone already is fine."""
+    """Remove a file; no error if absent."""
     system.unlink(path)
 
 
 def remove_folder(folder: Path) -> None:
-    """Remove a folder with the files directly in it; gone already is fine."""
+    """Remove a folder with the files directly in it; no error if absent."""
     if not folder.is_dir():
         return
     for path in folder.iterdir():
@@ -271,7 +271,7 @@ def remove_folder(folder: Path) -> None:
 
 
 def remove_tree(folder: Path) -> None:
-    """Remove a folder with everything in it; gone already is fine."""
+    """Remove a folder with all its content; no error if absent."""
     if not folder.is_dir():
         return
     for path in folder.iterdir():
@@ -285,7 +285,7 @@ def remove_tree(folder: Path) -> None:
 
 @contextlib.contextmanager
 def hold_lock(path: Path) -> Iterator[None]:
-    """Wait until no other thread or process holds the lock of this file, and hold it while the block runs."""
+    """Acquire the lock of this file across threads and processes, and hold it within the context."""
     fd = system.open(path, os.O_RDWR | os.O_CREAT)
     try:
         fcntl.flock(fd, fcntl.LOCK_EX)
@@ -295,7 +295,7 @@ def hold_lock(path: Path) -> Iterator[None]:
 
 
 class LockedError(Exception):
-    """Another process holds the lock; `holder` is the text it left there."""
+    """Another process holds the lock; `holder` is the text it wrote there."""
 
     def __init__(self, path: Path, holder: str) -> None:
         super().__init__(f"{path} is locked by {holder or 'another process'}")
@@ -304,16 +304,16 @@ class LockedError(Exception):
 
 
 class Lock:
-    """A lock that ends with its holder, also by kill -9.
+    """File lock that is released when its process ends, even by kill -9.
 
     Parameters
     ----------
-    shared : others may share it, and nobody has it for himself meanwhile.
+    shared : shared rather than exclusive.
 
     Raises
     ------
     LockedError
-        somebody else has it.
+        another process holds it.
     """
 
     def __init__(self, path: Path, holder: str, *, shared: bool = False) -> None:
@@ -338,5 +338,7 @@ class Lock:
         self.release()
 
     def release(self) -> None:
-        """Let the next one in; the file stays, so that two processes never lock two files of one name."""
+        """Release the lock; the file remains, so that two processes never lock different files of one
+        name.
+        """
         system.close(self._fd)

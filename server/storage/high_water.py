@@ -1,13 +1,13 @@
-"""How far the audit log has ever come, in a file beside the database: `audit.mark`.
+"""High-water mark of the audit log in a file next to the database: `audit.mark`.
 
-A database that was emptied, put back from a backup or cut at its end knows fewer rows, or others, than the
-mark says. Nobody may then take a file that this database does not know for a file that nobody needs.
+A database that was emptied, restored from a backup or truncated has fewer rows than the mark, or different
+ones. Files unknown to such a database must not be considered unreferenced.
 
-    gone_back(c, settings.mark)      # None, or a sentence: this is not the database that was here last
-    raise_mark(db, settings.mark)    # follow the log; leaves the mark alone when the database has gone back
-    set_mark(db, settings.mark)      # from now on this database is the right one
+    gone_back(c, settings.mark)      # None, or a sentence: the database was replaced
+    raise_mark(db, settings.mark)    # follow the log; unchanged if the database was restored
+    set_mark(db, settings.mark)      # trust this database from now on
 
-The mark is written after the commit that it speaks of, so a crash leaves it at most behind, never ahead.
+The mark is written after the commit it refers to, so after a crash it may lag but never lead.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ _HASH: Final = re.compile(r"[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class HighWater:
-    """The newest audit row that was ever seen: its number, from 1, and its hash, 64 hex digits."""
+    """The newest audit row ever seen: its number, from 1, and its hash, 64 hex digits."""
 
     seq: int
     hash: str
 
 
 class DamagedMarkError(Exception):
-    """The file is there but is no mark."""
+    """The file exists but is not a valid mark."""
 
 
 def read_mark(path: Path) -> HighWater | None:
     """The mark, None before the first; raises DamagedMarkError, OSError."""
     try:
-        found: Any = read_json(path.read_bytes())
-        mark = HighWater(found["seq"], found["hash"])
+        data: Any = read_json(path.read_bytes())
+        mark = HighWater(data["seq"], data["hash"])
     except FileNotFoundError:
         return None
     except (ValueError, TypeError, KeyError) as error:
@@ -63,17 +63,17 @@ def read_mark(path: Path) -> HighWater | None:
 
 
 def read_newest(c: Connection) -> HighWater | None:
-    """The last row of the audit log, None while there is none."""
+    """The last row of the audit log, None if empty."""
     row = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     return None if row is None else HighWater(row.seq, row.hash)
 
 
 def explain_lost_rows(c: Connection, path: Path) -> str | None:
-    """Why this is not the database that was here last, as a sentence; None when it is, or nobody can know.
+    """Reason why the database has been replaced, as a sentence; None if it has not or this is unknown.
 
     Parameters
     ----------
-    path : the mark. It may be ahead of `c` only when the database has lost rows.
+    path : the mark. It is ahead of `c` only if the database has lost rows.
     """
     try:
         mark = read_mark(path)
@@ -87,14 +87,14 @@ def explain_lost_rows(c: Connection, path: Path) -> str | None:
             f"The audit log ends at row {last.seq if last else 0}, but had reached row {mark.seq}: the "
             "database is an older one, or its end was cut."
         )
-    found = c.execute(select(audit.c.hash).where(audit.c.seq == mark.seq)).scalar()
-    if found != mark.hash:
+    digest = c.execute(select(audit.c.hash).where(audit.c.seq == mark.seq)).scalar()
+    if digest != mark.hash:
         return f"Audit row {mark.seq} is not the one that was here before: this is another database."
     return None
 
 
 def raise_mark(db: Database, path: Path) -> bool:
-    """Write the newest row into the mark; False when the database has gone back and the mark stays."""
+    """Update the mark to the newest row; False, with the mark unchanged, if the database was restored."""
     with db.read() as c:
         if explain_lost_rows(c, path) is not None:
             return False
@@ -104,7 +104,7 @@ def raise_mark(db: Database, path: Path) -> bool:
 
 
 def set_mark(db: Database, path: Path) -> None:
-    """Write the newest row into the mark, whatever it says now: somebody answers for this database."""
+    """Set the mark to the newest row unconditionally, after an operator has confirmed this database."""
     with db.read() as c:
         last = read_newest(c)
     _write(path, last)
@@ -118,7 +118,7 @@ def _write(path: Path, last: HighWater | None) -> None:
 
 
 class MarkKeeper:
-    """The thread that follows the audit log with the mark; one in each web process."""
+    """Thread that updates the mark with the audit log; one in each web process."""
 
     def __init__(self, db: Database, path: Path, interval_s: float = INTERVAL_S) -> None:
         self._db, self._path, self._interval_s = db, path, interval_s
@@ -130,7 +130,7 @@ class MarkKeeper:
         self._thread.start()
 
     def stop(self) -> None:
-        """Write the last mark and end."""
+        """Write the final mark and end."""
         self._stop.set()
         self._thread.join()
 

@@ -1,4 +1,4 @@
-"""Bring a database to the schema of this version; never start on one we do not know.
+"""Migrate a database to the schema of this version; unknown schemas are rejected.
 
     upgrade(settings.database_source)       # at start of the server and by `sagittal migrate`
 await_current(settings.database_source, stop)   # in a worker: waits until a server has migrated
@@ -57,15 +57,15 @@ _OTHER_MIGRATES = "Another program is changing the database for its version. Sta
 
 
 class MigrationError(RuntimeError):
-    """The database is not one this version can work with, or not reached; the message says what to do."""
+    """The database is incompatible with this version or unreachable; the message contains a remedy."""
 
 
 class NotMigratedError(MigrationError):
-    """The database has no schema yet, or an older one: the start of a server, or `migrate`, changes that."""
+    """The database has no schema yet, or an older one; starting a server or `migrate` upgrades it."""
 
 
 def configuration(database: Source, scripts: Path | None = None) -> Config:
-    """Alembic's configuration for a database; the scripts lie in the wheel or in the source tree."""
+    """Alembic configuration for a database; the scripts are in the wheel or the source tree."""
     config = Config(stdout=io.StringIO())
     config.set_main_option("path_separator", "os")
     folder = scripts or (INSTALLED if INSTALLED.is_dir() else SOURCE)
@@ -75,7 +75,7 @@ def configuration(database: Source, scripts: Path | None = None) -> Config:
 
 
 def read_revision(database: Source) -> str | None:
-    """The database's revision; None when there is none yet or it is empty; raises MigrationError."""
+    """The database's revision; None if it does not exist or is empty; raises MigrationError."""
     if isinstance(database, Path) and not database.exists():
         return None
     try:
@@ -101,12 +101,12 @@ def read_revision(database: Source) -> str | None:
 
 
 def exists(database: Source) -> bool:
-    """Whether there is a database: a file, or tables on the server; raises MigrationError."""
+    """Whether the database exists: a file, or tables on the server; raises MigrationError."""
     return database.exists() if isinstance(database, Path) else read_revision(database) is not None
 
 
 def require_database(database: Source) -> None:
-    """Raise MigrationError where there is no database: a command in a wrong folder begins no clinic there."""
+    """Raise MigrationError if there is no database, so that commands do not create one in a wrong folder."""
     if exists(database):
         return
     if isinstance(database, Path):
@@ -119,27 +119,27 @@ def require_database(database: Source) -> None:
 def upgrade(
     database: Source, *, target: str = "head", scripts: Path | None = None, backups: Path | None = None
 ) -> Path | None:
-    """Migrate in one transaction and return the backup made before it (None: there was nothing to keep).
+    """Migrate in one transaction and return the backup made before (None: no data existed).
 
     Parameters
     ----------
-    backups : folder of the backup, None = beside a file; PostgreSQL needs it when there is something to keep.
+    backups : folder of the backup, None = next to a file; required on PostgreSQL if it contains data.
 
     Raises
     ------
     MigrationError
-        the database was made by a version that this one does not know; web servers or workers run on it.
+        the database belongs to an unknown version, or web servers or workers are using it.
     """
     config = configuration(database, scripts)
     if isinstance(database, Path):
         fs.make_folder(database.parent)
         _keep_private(database)
         backups = backups or database.parent / "backups"
-    at = _known(config, database)
-    wanted = ScriptDirectory.from_config(config).as_revision_number(target)
+    revision = _known(config, database)
+    target_revision = ScriptDirectory.from_config(config).as_revision_number(target)
     if isinstance(database, Path):
-        return None if at == wanted else _change(config, database, target, backups, scripts)
-    if at == wanted and _has_delivery(database):
+        return None if revision == target_revision else _change(config, database, target, backups, scripts)
+    if revision == target_revision and _has_delivery(database):
         return None
     server = PostgresServer(database)
     with contextlib.ExitStack() as held:
@@ -147,7 +147,7 @@ def upgrade(
             held.enter_context(server.take_turn_to_migrate())
         except OperationalError as error:
             raise MigrationError(_OTHER_MIGRATES) from error
-        if _known(config, database) == wanted and _has_delivery(database):
+        if _known(config, database) == target_revision and _has_delivery(database):
             return None  # whoever had the turn before has done it
         if not held.enter_context(server.serve("")):
             raise MigrationError(_OTHERS_SERVE)
@@ -160,60 +160,60 @@ def upgrade(
 
 def _await_being_alone(server: PostgresServer) -> None:
     until = time.monotonic() + OTHERS_LEAVE_S
-    while others := server.list_others():
+    while hosts := server.list_others():
         if time.monotonic() > until:
-            raise MigrationError(_OTHERS_WORK.format(", ".join(others)))
+            raise MigrationError(_OTHERS_WORK.format(", ".join(hosts)))
         time.sleep(0.1)
 
 
 def _change(
     config: Config, database: Source, target: str, backups: Path | None, scripts: Path | None
 ) -> Path | None:
-    """Migrate, after a backup of what is there, whose path is returned."""
-    backup, at = None, _known(config, database)
-    if at is not None and at != ScriptDirectory.from_config(config).as_revision_number(target):
+    """Migrate after a backup of existing data; return its path."""
+    backup, revision = None, _known(config, database)
+    if revision is not None and revision != ScriptDirectory.from_config(config).as_revision_number(target):
         if backups is None:
             raise MigrationError("The database is older. Start the server, or run `sagittal migrate`.")
-        backup = _backup(database, at, backups, scripts)
+        backup = _backup(database, revision, backups, scripts)
     command.upgrade(config, target)
     return backup
 
 
 def copy_database(source: Source, target: Source, scripts: Path | None = None) -> None:
-    """Write a consistent copy, while others read and write, where there is nothing yet.
+    """Write a consistent copy of a database in use to an empty target.
 
     Raises
     ------
     MigrationError
-        `target` holds rows already.
+        `target` is not empty.
     """
     if isinstance(source, Path) and isinstance(target, Path):
         SqliteFile(source).write_copy(target)
         return
     revision = read_revision(source)
     upgrade(target, target=revision or "base", scripts=scripts)
-    there, here = engine_of(source).reader(), engine_of(target).writer()
+    origin, destination = engine_of(source).reader(), engine_of(target).writer()
     try:
-        with there.begin() as read, here.begin() as write:
+        with origin.begin() as read, destination.begin() as write:
             if not copy_rows(read, write):
                 raise MigrationError("The target holds rows already, so nothing was copied. Empty it.")
     finally:
-        there.dispose()
-        here.dispose()
+        origin.dispose()
+        destination.dispose()
 
 
 def require_current(database: Source, scripts: Path | None = None) -> None:
-    """Raise MigrationError unless there is a database and its schema is exactly this version's.
+    """Raise MigrationError unless a database exists and has exactly this version's schema.
 
-    NotMigratedError where a server of this version has only not been started yet.
+    Raises NotMigratedError if a server of this version has yet to be started.
     """
     require_database(database)
     config = configuration(database, scripts)
     head = ScriptDirectory.from_config(config).get_current_head()
-    at = _known(config, database)
-    if at != head:
+    revision = _known(config, database)
+    if revision != head:
         raise NotMigratedError(
-            f"The database is at revision {at}, this version needs {head}. "
+            f"The database is at revision {revision}, this version needs {head}. "
             "Start the server or run `sagittal migrate`."
         )
     if isinstance(database, str) and not _has_delivery(database):
@@ -224,12 +224,12 @@ def require_current(database: Source, scripts: Path | None = None) -> None:
 
 
 def await_current(database: Source, stop: threading.Event, pause_s: float = WAIT_S) -> None:
-    """Wait until the schema is this version's or `stop` is set; one log line says that it waits.
+    """Wait until the schema is this version's or `stop` is set; logs one line while waiting.
 
     Raises
     ------
     MigrationError
-        waiting does not help: there is no such database, or a newer version has changed it.
+        waiting is futile: there is no such database, or it belongs to a newer version.
     """
     is_waiting = False
     while not stop.is_set():
@@ -266,18 +266,18 @@ def _has_delivery(database: str) -> bool:
 
 
 def _known(config: Config, database: Source) -> str | None:
-    at = read_revision(database)
-    known = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
-    if at is not None and at not in known:
+    revision = read_revision(database)
+    revisions = {script.revision for script in ScriptDirectory.from_config(config).walk_revisions()}
+    if revision is not None and revision not in revisions:
         raise MigrationError(
-            f"The database is at revision {at}, which this version of Sagittal does not know: a newer one "
-            "wrote it. Install that version again, or restore the backup made before the upgrade."
+            f"The database is at revision {revision}, which this version of Sagittal does not know: a newer "
+            "one wrote it. Install that version again, or restore the backup made before the upgrade."
         )
-    return at
+    return revision
 
 
 def _keep_private(database: Path) -> None:
-    """Let nobody else read it, also in a folder open to everybody; SQLite goes by the umask."""
+    """Restrict the file to its owner, also in a shared folder; SQLite applies the umask."""
     logs = [database.with_name(database.name + end) for end in ("-wal", "-shm")]
     for path in (database, *(log for log in logs if log.exists())):
         with contextlib.suppress(PermissionError):  # of another owner, who decides

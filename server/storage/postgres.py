@@ -1,11 +1,12 @@
-"""A PostgreSQL server as the database: what only PostgreSQL knows (psycopg 3, the extra `postgres`).
+"""PostgreSQL-specific part of the database (psycopg 3, the extra `postgres`).
 
-Writing transactions take one advisory lock first, as BEGIN IMMEDIATE does on SQLite: who reads before it
-writes sees what the one before it committed, and the audit log cannot fork. Reading ones see one snapshot.
+Writing transactions first acquire one advisory lock, like BEGIN IMMEDIATE on SQLite: a transaction that reads
+before it writes sees the previous commit, and the audit log cannot fork. Reading transactions see one
+snapshot.
 
-Each word to the server and back costs two changes of processes, which a busy machine makes wait: the driver
-begins no transaction (BEGIN and lock are one word, a single statement needs none), and no connection is asked
-before its use whether it lives, but where something has come on its line or it was idle for long.
+Each round trip to the server costs two context switches, which are slow on a busy machine. Therefore the
+driver begins no transactions (BEGIN and lock are sent together, a single statement needs none), and
+connections are checked before use only if data have arrived on them or they were idle for long.
 """
 
 from __future__ import annotations
@@ -50,11 +51,12 @@ DELIVERY_SCHEMA = "procrastinate"
 
 
 class PostgresServer:
-    """A database of a PostgreSQL server.
+    """A database on a PostgreSQL server.
 
     Parameters
     ----------
-    url : postgresql://user:password@host:port/database; what it leaves out is libpq's (PGPASSFILE and so on).
+    url : postgresql://user:password@host:port/database; omitted parts are taken from libpq's sources
+        (PGPASSFILE etc.).
     """
 
     def __init__(self, url: str) -> None:
@@ -62,28 +64,28 @@ class PostgresServer:
         self.name = self._url.set(drivername="postgresql").render_as_string(hide_password=True)
 
     def writer(self) -> Engine:
-        """An engine whose transactions hold the write lock from their first statement."""
+        """Engine whose transactions hold the write lock from their first statement."""
         return self._locking(WAIT_MS, idle_in_transaction_session_timeout=f"{FORGOTTEN_S}s")
 
     def reader(self) -> Engine:
-        """An engine whose transactions see one snapshot and cannot write."""
+        """Engine whose transactions see one snapshot and are read-only."""
         engine = self._engine(WAIT_MS, default_transaction_read_only="on")
         begin_with(engine, "BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY")
         return engine
 
     def migrator(self) -> Engine:
-        """An engine for Alembic: a second program that migrates waits for the first, and finds it done."""
+        """Engine for Alembic; a second migrating program waits for the first and then has nothing to do."""
         return self._locking(MIGRATION_WAIT_MS)
 
     def has_delivery(self, c: Connection) -> bool:
-        """Whether the tables of the installed procrastinate are there; raises ModuleNotFoundError."""
+        """Whether the tables of the installed procrastinate exist; raises ModuleNotFoundError."""
         from procrastinate import __version__ as version
 
-        said = "SELECT obj_description(to_regnamespace(%s), 'pg_namespace')"
-        return bool(c.exec_driver_sql(said, (DELIVERY_SCHEMA,)).scalar_one() == version)
+        query = "SELECT obj_description(to_regnamespace(%s), 'pg_namespace')"
+        return bool(c.exec_driver_sql(query, (DELIVERY_SCHEMA,)).scalar_one() == version)
 
     def prepare_delivery(self) -> None:
-        """Make them, in place of another version's: what is lost so, a slow poll of the job table finds."""
+        """Create these tables, replacing those of another version; polling covers deliveries lost thereby."""
         from procrastinate import __version__ as version
         from procrastinate.schema import SchemaManager
 
@@ -103,7 +105,7 @@ class PostgresServer:
 
     @contextmanager
     def watch(self) -> Iterator[Callable[[], object]]:
-        """Give a question for a word which every commit that wrote something changes."""
+        """Context with a query whose result changes with every commit that wrote data."""
         engine = self._engine(WAIT_MS)
 
         def ask() -> object:
@@ -116,19 +118,19 @@ class PostgresServer:
             engine.dispose()
 
     def check(self, c: Connection) -> list[str]:
-        """Read every row; PostgreSQL complains of pages whose checksum is wrong (initdb --data-checksums)."""
-        found = []
+        """Read every row; PostgreSQL reports pages with wrong checksums (initdb --data-checksums)."""
+        problems = []
         for name in inspect(c).get_table_names():
             try:
                 with c.begin_nested():
                     quoted = c.dialect.identifier_preparer.quote(name)
                     c.exec_driver_sql(f"SELECT max(length(t::text)) FROM {quoted} AS t")  # noqa: S608
             except DBAPIError as error:
-                found.append(f"{name} cannot be read ({error.orig})")
-        return found
+                problems.append(f"{name} cannot be read ({error.orig})")
+        return problems
 
     def dangling(self, c: Connection) -> list[str]:
-        """Nothing: PostgreSQL enforces references at every statement, of migrations too."""
+        """Return nothing: PostgreSQL enforces references at every statement, also in migrations."""
         return []
 
     def probe(self, c: Connection) -> None:
@@ -136,15 +138,15 @@ class PostgresServer:
         c.exec_driver_sql("SELECT pg_logical_emit_message(true, 'sagittal', 'probe')")
 
     def highest_number(self, c: Connection, table: str) -> int:
-        """See storage/db.py; the sequence has it where PostgreSQL gives the numbers, else the newest row."""
+        """See storage/db.py; from the sequence for generated numbers, otherwise from the newest row."""
         quoted = c.dialect.identifier_preparer.quote(table)
-        given = c.exec_driver_sql(
+        generated = c.exec_driver_sql(
             "SELECT last_value FROM pg_sequences WHERE schemaname || '.' || sequencename "
             "= pg_get_serial_sequence(%s, 'seq')",
             (quoted,),
         ).scalar()
         newest = c.exec_driver_sql(f"SELECT max(seq) FROM {quoted}").scalar()  # noqa: S608
-        return max(int(given or 0), int(newest or 0))
+        return max(int(generated or 0), int(newest or 0))
 
     def raise_number(self, c: Connection, table: str, number: int) -> None:
         """See storage/db.py."""
@@ -152,9 +154,9 @@ class PostgresServer:
         c.exec_driver_sql("SELECT setval(pg_get_serial_sequence(%s, 'seq'), %s)", (quoted, number))
 
     def fold(self) -> bool:
-        """Rewrite the tables, what was deleted is gone from them then (not yet from PostgreSQL's own log).
+        """Rewrite the tables, which removes deleted data (but not from PostgreSQL's own log yet).
 
-        False when somebody has been reading an older state all the time, so that it had to stay.
+        False if a reader of an older state prevents it.
         """
         engine = self._engine(WAIT_MS)
         try:
@@ -171,7 +173,7 @@ class PostgresServer:
 
     @contextmanager
     def hold(self, *questions: str, wait_ms: int = WAIT_MS) -> Iterator[bool]:
-        """Hold advisory locks while the block runs, or until the connection breaks; False = one is taken."""
+        """Hold advisory locks within the context or until the connection breaks; False = one is taken."""
         engine = self._engine(wait_ms)
         try:
             with engine.connect() as c:
@@ -180,7 +182,7 @@ class PostgresServer:
             engine.dispose()
 
     def serve(self, node: str) -> AbstractContextManager[bool]:
-        """Hold the locks of a web server: without a name alone, with one beside others of other names."""
+        """Hold the locks of a web server: exclusive without a name, otherwise shared with other names."""
         if not node:
             return self.hold(f"pg_try_advisory_lock({SERVING})")
         return self.hold(
@@ -188,61 +190,61 @@ class PostgresServer:
         )
 
     def take_turn_to_migrate(self) -> AbstractContextManager[bool]:
-        """Hold the lock of who migrates, after whoever has it; raises OperationalError after two minutes."""
+        """Wait for the migration lock and hold it; raises OperationalError after two minutes."""
         return self.hold(f"pg_advisory_lock({MIGRATING}) IS NOT NULL", wait_ms=MIGRATION_WAIT_MS)
 
     def list_others(self) -> list[str]:
-        """Hosts of the programs of Sagittal on this database but who serves, migrates or waits to migrate."""
+        """Hosts of other Sagittal programs on this database, except servers and migrating programs."""
         engine = self.reader()
         try:
             with engine.connect() as c:
-                found = c.exec_driver_sql(
+                rows = c.exec_driver_sql(
                     "SELECT DISTINCT coalesce(host(client_addr), 'this computer') FROM pg_stat_activity AS a "
                     "WHERE datname = current_database() AND application_name = %s "
                     "AND pid <> pg_backend_pid() AND NOT EXISTS (SELECT FROM pg_locks WHERE pid = a.pid "
                     "AND locktype = 'advisory' AND objsubid = 1 AND objid::bigint IN (%s, %s)) ORDER BY 1",
                     (APPLICATION, SERVING, MIGRATING),
                 )
-                return list(found.scalars())
+                return list(rows.scalars())
         finally:
             engine.dispose()
 
     def do_alone(self, duty: str) -> AbstractContextManager[bool]:
-        """Hold the lock of a duty that one program does at a time."""
+        """Hold the lock of a task that runs in one program at a time."""
         return self.hold(f"pg_try_advisory_lock({DUTIES}, {_number(duty)})")
 
     def read_clock(self, c: Connection) -> float:
-        """The server's time, seconds since 1970 UTC."""
+        """Server time, seconds since 1970 UTC."""
         return float(c.exec_driver_sql("SELECT extract(epoch FROM clock_timestamp())").scalar_one())
 
     def explain(self, error: DBAPIError) -> str:
-        """Why the server cannot be used, and what to do."""
-        said = " ".join(str(error.orig).split())
+        """Reason why the server cannot be used, and the remedy."""
+        text = " ".join(str(error.orig).split())
         attempt = getattr(error.orig, "pgconn", None)
-        if any(words in said for words in FULL):
+        if any(words in text for words in FULL):
             return (
-                f"PostgreSQL has no connection left for {self.name} ({said}). Raise its max_connections, "
+                f"PostgreSQL has no connection left for {self.name} ({text}). Raise its max_connections, "
                 "or run fewer workers: each keeps two, a web server up to 56."
             )
-        asked = attempt is not None and (attempt.needs_password or attempt.used_password)
-        if asked or "FATAL" in said:
+        is_refused = attempt is not None and (attempt.needs_password or attempt.used_password)
+        if is_refused or "FATAL" in text:
             return (
-                f"PostgreSQL refused {self.name} ({said}). Check user, password and the database's name in "
+                f"PostgreSQL refused {self.name} ({text}). Check user, password and the database's name in "
                 "SAGITTAL_DATABASE_URL."
             )
         return (
-            f"PostgreSQL is not reached at {self.name} ({said}). Check that it runs, and address and port in "
+            f"PostgreSQL is not reached at {self.name} ({text}). Check that it runs, and address and port in "
             "SAGITTAL_DATABASE_URL."
         )
 
-    def _locking(self, wait_ms: int, **told: str) -> Engine:
-        engine = self._engine(wait_ms, **told)
+    def _locking(self, wait_ms: int, **parameters: str) -> Engine:
+        engine = self._engine(wait_ms, **parameters)
         begin_with(engine, f"BEGIN; SELECT pg_advisory_xact_lock({WRITING})")
         return engine
 
     def _engine(self, wait_ms: int, **more: str) -> Engine:
-        """An engine whose statements are transactions of their own, unless it is told how to begin one."""
-        told = {
+        """Engine in autocommit mode unless configured to begin transactions."""
+        parameters = {
             "timezone": "UTC",
             "synchronous_commit": "on",
             "lock_timeout": wait_ms,
@@ -263,7 +265,7 @@ class PostgresServer:
                 "autocommit": True,
                 "connect_timeout": 10,
                 "application_name": APPLICATION,
-                "options": " ".join(f"-c {name}={value}" for name, value in told.items()),
+                "options": " ".join(f"-c {name}={value}" for name, value in parameters.items()),
             },
         )
         event.listen(engine, "handle_error", _hide_details)
@@ -272,9 +274,10 @@ class PostgresServer:
 
 
 def _renew_broken(engine: Engine) -> None:
-    """Have the pool make its connections anew where PostgreSQL was restarted since one was used last.
+    """Replace the connections of the pool if PostgreSQL was restarted since their last use.
 
-    A server that ends says so on the line, where it says nothing else unasked: a look there is no word to it.
+    A terminating server sends a message on the connection, which is otherwise silent when idle, so this can
+    be detected without a round trip.
     """
     refused = engine.dialect.loaded_dbapi.Error
 
@@ -297,23 +300,23 @@ def _renew_broken(engine: Engine) -> None:
 
 
 def _number(word: str) -> int:
-    """A word as a signed number of 32 bits."""
+    """Hash of a name as a signed 32-bit number."""
     return zlib.crc32(word.encode()) - 2**31
 
 
 def _hide_details(context: ExceptionContext) -> None:
-    """Take the row's values out of an error's text, which goes to the log: they may be a patient's."""
+    """Remove row values from an error's text, as they may contain patient data and would be logged."""
     raw, wrapped = context.original_exception, context.sqlalchemy_exception
     short = getattr(getattr(raw, "diag", None), "message_primary", None)
     if short is None:
         return
-    said, raw.args = str(raw), (short,)
+    text, raw.args = str(raw), (short,)
     if wrapped is not None:
-        wrapped.args = tuple(str(part).replace(said, short) for part in wrapped.args)
+        wrapped.args = tuple(str(part).replace(text, short) for part in wrapped.args)
 
 
 def _outlive_readers(c: Connection) -> bool:
-    """Wait until every transaction that can still see what was deleted has ended; False when one goes on."""
+    """Wait until all transactions that can still see deleted data have ended; False on timeout."""
     began = c.exec_driver_sql("SELECT clock_timestamp()").scalar_one()
     older = (
         "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database() "

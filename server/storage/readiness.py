@@ -1,4 +1,4 @@
-"""Whether the server can do its work: asked by monitors, answered by writing."""
+"""Readiness checks for monitoring, which test by writing."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ _REFUSES = "The bucket of stored files refuses the server; see its log."
 
 
 class Readiness:
-    """The checks and their newest outcome; anybody may ask, so they are made at most every EVERY_S.
+    """Checks and their latest outcome; repeated at most every EVERY_S, as the route is public.
 
     Parameters
     ----------
     settings, db, blobs : the installation. clock : monotonic seconds.
-    parts : further checks by name, each says "ok" or what does not work.
+    parts : further checks by name, each returns "ok" or a description of the fault.
     """
 
     EVERY_S: ClassVar[float] = 5.0
@@ -52,15 +52,15 @@ class Readiness:
         self._found: Mapping[str, str] = {}
 
     def checks(self) -> Mapping[str, str]:
-        """What each part says: "ok", or a sentence about what does not work."""
+        """Result of each check: "ok", or a sentence about the fault."""
         # a check may wait for a bucket: who asks meanwhile gets the outcome before, and keeps no thread
         if not self._lock.acquire(blocking=self._checked_at is None):
             return self._found
         try:
-            at = self._clock()
-            if self._checked_at is None or at - self._checked_at >= self.EVERY_S:
+            time = self._clock()
+            if self._checked_at is None or time - self._checked_at >= self.EVERY_S:
                 self._found = self._check()
-                self._checked_at = at
+                self._checked_at = time
             return self._found
         finally:
             self._lock.release()

@@ -1,4 +1,4 @@
-"""Which stored files the rows refer to."""
+"""References from rows to stored files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from sagittal.server.storage.schema.tables import (
 
 
 def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[str, str]]:
-    """Every (space, sha256) that a row refers to, of one session or all."""
+    """All (space, sha256) referenced by rows, of one session or all."""
     of_session = patient.join(session, session.c.patient_id == patient.c.id)
     of_take = of_session.join(recording, recording.c.session_id == session.c.id)
     of_analysis = of_take.join(analysis, analysis.c.recording_id == recording.c.id)
@@ -48,9 +48,11 @@ def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[s
 
 
 def discard(db: Database, blobs: BlobStore, space: str, names: Iterable[str]) -> None:
-    """Remove files for good that were stored for something that has been erased meanwhile."""
-    wanted = sorted(set(names))
-    for group in (wanted[i : i + blobs.moved_at_once] for i in range(0, len(wanted), blobs.moved_at_once)):
+    """Permanently remove files stored for a resource that has been erased meanwhile."""
+    selected = sorted(set(names))
+    for group in (
+        selected[i : i + blobs.moved_at_once] for i in range(0, len(selected), blobs.moved_at_once)
+    ):
         with db.write() as c:
             used = list_referenced(c)
             blobs.remove(space, *(name for name in group if (space, name) not in used))

@@ -1,6 +1,6 @@
-"""When the disk refuses to be written: one reading of the errors of the system, of SQLite and of PostgreSQL.
+"""Uniform classification of disk write errors of the system, SQLite and PostgreSQL.
 
-if refusal_of(error) is not None: ...     # nothing was written; what is stored can still be read
+if refusal_of(error) is not None: ...     # nothing was written; stored data can still be read
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 
 
 class Refusal(StrEnum):
-    """Why the disk takes nothing; the value is the code of the problem."""
+    """Reason why the disk rejects writes; the value is the code of the problem."""
 
     FULL = "disk_full"
     NOT_WRITABLE = "disk_not_writable"
 
     @property
     def sentence(self) -> str:
-        """What a person is told."""
+        """Message for users."""
         return _SENTENCES[self]
 
 
@@ -52,7 +52,9 @@ _PASSING = {"55P03", "57P01", "57P03", None}
 
 
 def is_busy(error: BaseException) -> bool:
-    """Whether another writer held the database for too long, or PostgreSQL is away: trying again may help."""
+    """Whether another writer held the database for too long, or PostgreSQL is unavailable; retrying
+    may help.
+    """
     if not isinstance(error, OperationalError):
         return False
     passes = getattr(error.orig, "sqlstate", "of SQLite") in _PASSING
@@ -60,7 +62,7 @@ def is_busy(error: BaseException) -> bool:
 
 
 def refusal_of(error: BaseException) -> Refusal | None:
-    """Tell why the disk refused; None when the error is another one."""
+    """Classify a disk error; None if the error is of another kind."""
     if isinstance(error, DBAPIError):
         error = error.orig or error
     if isinstance(error, sqlite3.Error):

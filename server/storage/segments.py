@@ -1,8 +1,8 @@
-"""The log of a live take: `live/<take>.log`, appended to while it streams, read back after a crash.
+"""Log of a live trial: `live/<take>.log`, appended during streaming and read after a crash.
 
-A log begins durably with its header and its first record, so whoever finds the file finds a whole log; after
-that records are appended and synced in groups. What a crash leaves is the longest valid prefix
-(core/formats/live_log.py has the bytes); reading never holds more than a few megabytes.
+A log is created durably with its header and first record, so an existing file is always a valid log; then
+records are appended and synced in groups. After a crash the longest valid prefix remains (for the format see
+core/formats/live_log.py); reading never needs more than a few megabytes of memory.
 """
 
 from __future__ import annotations
@@ -38,7 +38,9 @@ _LONGEST: Final = MOST_FRAME_BYTES + 64
 
 @dataclass(frozen=True)
 class Damage:
-    """What of a log cannot be read though it was written: `lost` bytes from `start` on; where it is kept."""
+    """Unreadable part of a log although it was written: `lost` bytes from `start` on, and the retained
+    copy.
+    """
 
     start: int
     lost: int
@@ -46,7 +48,7 @@ class Damage:
 
     @property
     def sentence(self) -> str:
-        """For the people of the session."""
+        """Description for users."""
         return (
             f"{self.lost} {plural(self.lost, 'byte', 'bytes')} of the live recording "
             f"{plural(self.lost, 'was', 'were')} damaged on the server's disk and "
@@ -55,11 +57,11 @@ class Damage:
 
 
 class TakeLog:
-    """A log that is open for appending.
+    """A log open for appending.
 
     Parameters
     ----------
-    path : the file. size : its bytes, all of them whole records and synced. damage : what was cut off of it.
+    path : the file. size : its bytes, all complete and synced records. damage : part that was removed.
     """
 
     def __init__(self, path: Path, size: int, damage: Damage | None = None) -> None:
@@ -70,30 +72,30 @@ class TakeLog:
 
     @property
     def size(self) -> int:
-        """Bytes that can be read now, whole records all of them."""
+        """Readable bytes, all complete records."""
         return self._file.size
 
     def append(self, records: bytes) -> None:
-        """Write whole records; after an OSError (disk full) none of them is there and a retry may work."""
+        """Append complete records; after an OSError (disk full) none is stored and a retry may work."""
         self._file.append(records)
 
     def sync(self) -> None:
-        """Wait until everything appended survives a power cut; after an OSError call `drop_unsynced`."""
+        """Wait until everything appended is durable; after an OSError call `drop_unsynced`."""
         self._file.sync()
         self._synced = self._file.size
 
     def drop_unsynced(self) -> None:
-        """Cut off what has not been synced, durably."""
+        """Durably truncate to the synced part."""
         self._file.cut(self._synced)
         self._file.sync()
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the file."""
         self._file.close()
 
 
 def create(path: Path, hello: bytes) -> TakeLog:
-    """Begin a log; when this returns mark and hello survive a power cut.
+    """Create a log with a durable header and hello.
 
     Parameters
     ----------
@@ -102,7 +104,7 @@ def create(path: Path, hello: bytes) -> TakeLog:
     Raises
     ------
     InputError
-        `live_log_damaged`: a file is there already that is more than a part of this beginning.
+        `live_log_damaged`: a file exists that contains more than part of this header.
     """
     content = FILE_MARK + record("H", hello)
     fs.make_folder(path.parent)
@@ -116,17 +118,17 @@ def create(path: Path, hello: bytes) -> TakeLog:
 
 
 def recover(path: Path, see: Callable[[LogRecord], None]) -> TakeLog | None:
-    """Open a log whose writer has ended: its longest valid prefix stays, durably; the rest is cut off.
+    """Open a log whose writer has ended, durably truncated to its longest valid prefix.
 
-    Of a damaged one a whole copy is kept, and `TakeLog.damage` says so.
+    A full copy of a damaged log is retained, and `TakeLog.damage` describes it.
 
     Parameters
     ----------
-    see : gets every record that stays, in order.
+    see : called with every valid record, in order.
 
     Returns
     -------
-    None, and nothing is touched, when there is no whole first record. A crash of ours does not leave that.
+    None, without changes, if there is no complete first record, which cannot result from a crash of ours.
     """
     size = 0
     for size, one in read_records(path):  # noqa: B007 - the last one is used
@@ -150,10 +152,10 @@ def recover(path: Path, see: Callable[[LogRecord], None]) -> TakeLog | None:
 
 
 def find_damage(path: Path, size: int) -> Damage | None:
-    """What lies behind the first `size` bytes of a log, when it is not just an end torn by a crash.
+    """Damage after the first `size` bytes of a log, other than an end torn by a crash.
 
-    Damaged is a log with a whole record behind what cannot be read, or with a last record that has its whole
-    length and another content. A torn end is shorter, or ends in the zeros of blocks never written.
+    A log is damaged if a complete record follows unreadable data, or if the last record has its full length
+    but invalid content. A torn end is shorter, or ends in zeros of blocks never written.
     """
     length = path.stat().st_size
     if length <= size:
@@ -162,17 +164,17 @@ def find_damage(path: Path, size: int) -> Damage | None:
         if is_whole_length(data[size : size + RECORD_HEAD], length - size) and data[length - 1]:
             return Damage(size, length - size)
         for mark in RECORD_STARTS:
-            at = data.find(mark, size)
-            while at >= 0:
-                begin = at - RECORD_HEAD
+            position = data.find(mark, size)
+            while position >= 0:
+                begin = position - RECORD_HEAD
                 if begin > size and scan_records(data[begin : begin + _LONGEST])[0]:
                     return Damage(size, length - size)
-                at = data.find(mark, at + 1)
+                position = data.find(mark, position + 1)
     return None
 
 
 def count_readable_bytes(path: Path) -> int:
-    """How many of a log's bytes are whole records from its beginning on; 0 = not even the first."""
+    """Number of bytes in complete records from the start of a log; 0 = not even the first."""
     size = 0
     for size, _ in read_records(path):  # noqa: B007 - the last one is used
         pass
@@ -180,7 +182,7 @@ def count_readable_bytes(path: Path) -> int:
 
 
 def keep_original(path: Path) -> Path:
-    """Copy a log durably to a name beside it that is free, and return that."""
+    """Durably copy a log to an unused name in the same folder, and return that."""
     number = 1
     while (target := path.with_name(f"{path.stem}.{number}.damaged")).exists():
         number += 1
@@ -197,29 +199,29 @@ def _head(path: Path, size: int) -> bytes:
 
 
 def read_records(path: Path, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
-    """Read the whole records of a log and where in the file each ends, a few megabytes at a time.
+    """Yield the complete records of a log with their end offsets, reading a few megabytes at a time.
 
     Parameters
     ----------
-    start : 0, or the end of a record read before. `LogRecord.end` is of no use here: it counts in a chunk.
+    start : 0, or the end of an earlier record. Do not use `LogRecord.end`, which is relative to a chunk.
     """
     with path.open("rb") as file:
         yield from read_open_records(file, start)
 
 
 def read_open_records(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, LogRecord]]:
-    """The same of a file that is open, at its beginning."""
+    """Like `read_records` for an open file, positioned at its start."""
     if start == 0:
         start = len(FILE_MARK)
         if file.read(start) != FILE_MARK:
             return
     file.seek(start)
-    rest = b""
+    unread = b""
     while chunk := file.read(CHUNK):
-        rest += chunk
-        found, used = scan_records(rest)
-        for one in found:
+        unread += chunk
+        records, used = scan_records(unread)
+        for one in records:
             yield start + one.end, one
-        start, rest = start + used, rest[used:]
-        if len(rest) >= _LONGEST:
+        start, unread = start + used, unread[used:]
+        if len(unread) >= _LONGEST:
             return  # a whole record would have fitted: it is damaged

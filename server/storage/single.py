@@ -1,6 +1,6 @@
-"""Transactions that begin by a statement of ours, and single statements, which are snapshots by themselves.
+"""Explicit transaction starts, and single statements without a transaction, each its own snapshot.
 
-For drivers that begin none.
+For drivers that do not begin transactions.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _SINGLE: Final = "sagittal_single"
 
 
 def begin_with(engine: Engine, statement: str) -> None:
-    """Begin every transaction of an engine by a statement, or by several that are sent as one."""
+    """Begin every transaction of an engine with a statement, or several sent together."""
 
     @event.listens_for(engine, "begin")
     def _begin(connection: Connection) -> None:
@@ -22,5 +22,5 @@ def begin_with(engine: Engine, statement: str) -> None:
 
 
 def without_transactions(engine: Engine) -> Engine:
-    """The same engine, with its connections, for single statements."""
+    """The same engine and connections, for single statements."""
     return engine.execution_options(**{_SINGLE: True})

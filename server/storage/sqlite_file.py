@@ -1,4 +1,4 @@
-"""One SQLite file as the database: what only SQLite knows.
+"""SQLite-specific part of the database.
 
 Measured, three processes of 150 read-modify-writes each: SQLAlchemy's default lost 229 updates silently,
 deferred BEGIN gave 224 errors that busy_timeout cannot help, BEGIN IMMEDIATE lost none. FULL costs one fsync
@@ -31,15 +31,15 @@ class SqliteFile:
         self.path = path
 
     def writer(self) -> Engine:
-        """An engine whose transactions hold the write lock from their first statement."""
+        """Engine whose transactions hold the write lock from their first statement."""
         return self._engine(begin="BEGIN IMMEDIATE")
 
     def reader(self) -> Engine:
-        """An engine whose transactions see one snapshot and cannot write."""
+        """Engine whose transactions see one snapshot and are read-only."""
         return self._engine(begin="BEGIN", query_only=True)
 
     def migrator(self) -> Engine:
-        """An engine for Alembic: BEGIN IMMEDIATE, foreign keys not enforced.
+        """Engine for Alembic: BEGIN IMMEDIATE, foreign keys not enforced.
 
         A batch migration drops and renames whole tables; with enforcement on, references act on that
         (measured: a cascading child lost all its rows and foreign_key_check was clean). The pragma only works
@@ -49,17 +49,17 @@ class SqliteFile:
 
     @contextmanager
     def watch(self) -> Iterator[Callable[[], object]]:
-        """Keep one connection that asks for a word which every commit of another one changes."""
+        """Context with a query whose result changes with every commit of another connection."""
         with closing(self._plain()) as connection:
             yield lambda: connection.execute("PRAGMA data_version").fetchone()[0]
 
     def check(self, c: Connection) -> list[str]:
-        """Complaints of SQLite's own checks: page structure, indexes, CHECK and NOT NULL, foreign keys."""
+        """Errors of SQLite's own checks: page structure, indexes, CHECK and NOT NULL, foreign keys."""
         rows = [str(row[0]) for row in c.exec_driver_sql("PRAGMA integrity_check(100)")]
         return ([] if rows == ["ok"] else rows) + self.dangling(c)
 
     def dangling(self, c: Connection) -> list[str]:
-        """Rows that refer to nothing, as sentences."""
+        """Rows with dangling references, as sentences."""
         rows = c.exec_driver_sql("PRAGMA foreign_key_check").all()
         return [
             f"row {rowid} of {table} refers to a missing row of {parent}" for table, rowid, parent, _ in rows
@@ -81,21 +81,21 @@ class SqliteFile:
         c.exec_driver_sql("INSERT INTO sqlite_sequence (name, seq) VALUES (?, ?)", (table, number))
 
     def write_copy(self, target: Path) -> None:
-        """Write a consistent copy while others read and write (a plain copy is unusable under WAL)."""
+        """Write a consistent copy of a database in use (a plain file copy is unusable under WAL)."""
         with closing(self._plain()) as connection:
             connection.execute("VACUUM INTO ?", (str(target),))
 
     def fold(self) -> bool:
-        """Move the write-ahead log into the file and empty it, what was deleted is gone then.
+        """Merge the write-ahead log into the file and empty it, which removes deleted data.
 
-        False when somebody has been reading an older state all the time, so that the log had to stay.
+        False if a reader of an older state prevents it.
         """
         with closing(self._plain()) as connection:
             busy = connection.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]
         return not busy
 
     def _plain(self) -> sqlite3.Connection:
-        """A connection outside SQLAlchemy, for what may not run inside a transaction."""
+        """Connection outside SQLAlchemy, for statements that cannot run in a transaction."""
         timeout = BUSY_TIMEOUT_MS / 1000
         return sqlite3.connect(self.path, timeout=timeout, isolation_level=None, check_same_thread=False)
 
@@ -120,7 +120,7 @@ class SqliteFile:
 
 
 def _set_pragmas(connection: DBAPIConnection, query_only: bool, foreign_keys: bool) -> None:
-    """Set what SQLite keeps per connection: WAL, durable commits, enforced keys, zeroed deletions."""
+    """Set per-connection options of SQLite: WAL, durable commits, enforced keys, zeroed deletions."""
     cursor = connection.cursor()
     for pragma in (
         f"busy_timeout={BUSY_TIMEOUT_MS}",

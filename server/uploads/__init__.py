@@ -1,1 +1,1 @@
-"""What comes in as files: recordings, tables, videos, references."""
+"""Uploads: recordings, tables, videos, references."""

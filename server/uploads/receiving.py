@@ -1,7 +1,7 @@
-"""One file on its way into the upload set of a session: its name, its size and the room for it.
+"""Reception of a file into the upload set of a session: checks of name, size and free space.
 
 with receiving.receive(db, blobs, settings, actor, sid, "left.csv") as upload:
-    upload.write(chunk)          # as often as there are chunks; constant memory
+    upload.write(chunk)          # once per chunk; constant memory
     stored = upload.keep()       # file on disk first, then the row
 """
 
@@ -25,11 +25,11 @@ from sagittal.server.uploads.recordings import RecordedFile, add_file, current, 
 
 
 class receive:  # noqa: N801 - a verb: with receive(...) as upload
-    """One file on its way into the current set; leaving without `keep` leaves nothing behind.
+    """Context manager that receives a file into the current set; leaving without `keep` discards it.
 
     Parameters
     ----------
-    size : bytes that are announced, 0 = not known; room for them is asked for before the first comes.
+    size : announced bytes, 0 = unknown; free space is checked before the first is received.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
             raise make_too_large(self._name, error.limit) from None
 
     def keep(self) -> RecordedFile:
-        """Store the file and its row; a file of the same name in the set is replaced."""
+        """Store the file and its row; replaces a file of the same name in the set."""
         blob = self._receiver.keep()
         with self._db.write() as c:
             self._blobs.require(patient_of(c, self._session_id), blob.sha256)
@@ -88,12 +88,12 @@ class receive:  # noqa: N801 - a verb: with receive(...) as upload
 
 
 def check_set(c: Connection, settings: Settings, session_id: str, name: str, size: int) -> None:
-    """Raise TooLarge set_too_large, too_many_files unless a file of this size has room beside the others."""
+    """Raise TooLarge set_too_large, too_many_files if a file of this size does not fit into the set."""
     this = current(c, session_id)
-    others = [f for f in this.files if f.name != name] if this else []
-    if len(others) + 1 > settings.max_files:
+    siblings = [f for f in this.files if f.name != name] if this else []
+    if len(siblings) + 1 > settings.max_files:
         raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
-    total = sum(f.size for f in others) + size
+    total = sum(f.size for f in siblings) + size
     if total > settings.max_set_bytes:
         raise TooLarge(
             "set_too_large",
@@ -103,7 +103,7 @@ def check_set(c: Connection, settings: Settings, session_id: str, name: str, siz
 
 
 def make_too_large(name: str, limit: int) -> TooLarge:
-    """What is answered to a file beyond the limit of one file, in bytes."""
+    """Error for a file that exceeds the size limit in bytes."""
     return TooLarge(
         "file_too_large",
         f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "
@@ -112,7 +112,7 @@ def make_too_large(name: str, limit: int) -> TooLarge:
 
 
 class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
-    """There is too little free space to take a file, and to go on working."""
+    """Not enough free space to accept a file and continue working."""
 
     status = 507
 
@@ -121,13 +121,13 @@ class DiskFull(ServiceError):  # noqa: N818 - the name of the HTTP status
 
 
 def require_room(blobs: BlobStore, settings: Settings, size: int) -> None:
-    """Raise DiskFull when the disk cannot take so many bytes and keep the free space of the settings."""
+    """Raise DiskFull if this many bytes would not leave the free space required by the settings."""
     if shutil.disk_usage(blobs.incoming).free - size < settings.min_free_bytes:
         raise DiskFull
 
 
 def check_name(name: str) -> str:
-    """A file's name as we keep it: forward slashes, composed Unicode; raises InputError bad_file_name."""
+    """Normalize a file name: forward slashes, composed Unicode; raises InputError bad_file_name."""
     plain = unicodedata.normalize("NFC", name).replace("\\", "/").strip("/")
     parts = plain.split("/")
     if (

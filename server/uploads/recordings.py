@@ -1,8 +1,8 @@
-"""Upload sets: the files of a take as they came, what was found in them, and which sensor is worn where.
+"""Upload sets: the original files of a trial, their inspection, and the mapping of sensors to segments.
 
-A session's current recording is its newest. Its files may change until an analysis or a tuning was asked for;
-after that it never changes, and the next added or removed file starts a new one with the same other files.
-How a file comes in says server/uploads/receiving.py.
+A session's current recording is its newest. Its files may change until an analysis or tuning is requested;
+then it becomes immutable, and adding or removing a file starts a new one with the same other files. For the
+reception of files see server/uploads/receiving.py.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ ANALYSE = "analyse"
 
 @dataclass(frozen=True)
 class RecordedFile:
-    """A file exactly as it was uploaded, or as an analysis wrote it: its name, bytes, and sha256."""
+    """A file exactly as uploaded or as written by an analysis: name, size, and sha256."""
 
     name: str
     size: int
@@ -52,9 +52,9 @@ class StoredRecording:
     Parameters
     ----------
     state : draft (not inspected since the last change), ready (inspected), failed (could not be read).
-    manifest : the mapping as last set, None = nobody said anything.
-    inspection : what was found (sagittal.core.quality.describe as JSON), None until inspected.
-    job : the newest inspection, for its progress or its error.
+    manifest : the latest mapping, None = not set.
+    inspection : inspection results (sagittal.core.quality.describe as JSON), None until inspected.
+    job : the latest inspection job, for its progress or error.
     """
 
     id: str
@@ -98,7 +98,7 @@ def get(c: Connection, recording_id: str) -> StoredRecording:
 def set_manifest(
     c: Connection, actor: audit.Actor | None, session_id: str, manifest: Mapping[str, Any] | None
 ) -> StoredRecording:
-    """Keep a mapping for the current recording; raises ManifestError, Conflict no_files."""
+    """Store a mapping for the current recording; raises ManifestError, Conflict no_files."""
     from sagittal.core.formats.manifest import manifest_of  # slow import
 
     if manifest is not None:
@@ -114,7 +114,7 @@ def set_manifest(
 
 
 def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> StoredRecording:
-    """Take a file out of the current set (of its successor, if it is already analysed); raises NotFound."""
+    """Remove a file from the current set (of its successor if already analysed); raises NotFound."""
     this = current(c, session_id)
     if this is None or name not in {f.name for f in this.files}:
         raise NotFound("file", name)
@@ -127,7 +127,7 @@ def remove_file(c: Connection, actor: audit.Actor | None, session_id: str, name:
 
 
 def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_id: str) -> JobView:
-    """Ask for "what we found"; unchanged files are looked at once; raises Conflict no_files."""
+    """Request an inspection; unchanged files are inspected only once; raises Conflict no_files."""
     this = require_current(c, session_id)
     if this.inspection is not None and this.job is not None and this.job.state == "done":
         return this.job
@@ -148,11 +148,13 @@ def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_i
     return view
 
 
-def publish_inspection(c: Connection, recording_id: str, input_sha256: str, found: Mapping[str, Any]) -> None:
-    """Keep what was found; raises Conflict files_changed when the set is no longer the one that was read."""
+def publish_inspection(
+    c: Connection, recording_id: str, input_sha256: str, result: Mapping[str, Any]
+) -> None:
+    """Store inspection results; raises Conflict files_changed if the set has changed meanwhile."""
     if get(c, recording_id).input_sha256 != input_sha256:
         raise Conflict("files_changed", "Files were added or removed meanwhile; the new set is looked at.")
-    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(found)))
+    c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(result)))
 
 
 def require_current(c: Connection, session_id: str) -> StoredRecording:
@@ -164,13 +166,13 @@ def require_current(c: Connection, session_id: str) -> StoredRecording:
 
 
 def job_inputs(this: StoredRecording) -> dict[str, Any]:
-    """What a job needs to know of the files, fixed at submission."""
+    """Files of a job, fixed at submission."""
     files = [{"name": f.name, "size": f.size, "sha256": f.sha256} for f in this.files]
     return {"space": this.patient_id, "files": files, "input_sha256": this.input_sha256}
 
 
 def file_bytes(c: Connection, blobs: BlobStore, recording_id: str, name: str) -> bytes:
-    """An original file, verified; raises NotFound, IntegrityError."""
+    """Read and verify an original file; raises NotFound, IntegrityError."""
     this = get(c, recording_id)
     for f in this.files:
         if f.name == name:
@@ -181,7 +183,7 @@ def file_bytes(c: Connection, blobs: BlobStore, recording_id: str, name: str) ->
 def add_file(
     c: Connection, actor: audit.Actor | None, session_id: str, name: str, blob: Blob
 ) -> RecordedFile:
-    """Refer to a stored file from the current set, in place of one of its name."""
+    """Add a reference to a stored file to the current set, replacing one of its name."""
     this = current(c, session_id)
     for f in this.files if this else ():
         if (f.name, f.sha256) == (name, blob.sha256):
@@ -226,18 +228,18 @@ def _recording(c: Connection, row: Any) -> StoredRecording:
 
 def patient_of(c: Connection, session_id: str) -> str:
     """Id of the patient of a session; raises NotFound for the session."""
-    found = c.execute(
+    owner_id = c.execute(
         select(patient.c.id)
         .join(session, session.c.patient_id == patient.c.id)
         .where(session.c.id == session_id)
     ).scalar()
-    if found is None:
+    if owner_id is None:
         raise NotFound("session", session_id)
-    return str(found)
+    return str(owner_id)
 
 
 def _editable(c: Connection, session_id: str) -> str:
-    """Id of the recording whose files may change now; what was found in it no longer holds."""
+    """Id of the recording whose files may change; its inspection results are discarded."""
     this = current(c, session_id)
     fixed = (
         this is not None
@@ -258,12 +260,12 @@ def _editable(c: Connection, session_id: str) -> str:
     manifest = this.manifest if this else None
     c.execute(insert(recording).values(id=fresh, session_id=session_id, manifest=manifest, created_at=now()))
     if this is not None:
-        kept = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
-        files = select(literal(fresh), *kept).where(recording_file.c.recording_id == this.id)
-        c.execute(insert(recording_file).from_select(["recording_id", *kept], files))
+        columns = [recording_file.c[name] for name in ("name", "size", "sha256", "added_at")]
+        files = select(literal(fresh), *columns).where(recording_file.c.recording_id == this.id)
+        c.execute(insert(recording_file).from_select(["recording_id", *columns], files))
     return fresh
 
 
 def _sources(manifest: Mapping[str, Any] | None) -> object:
-    """The part of a manifest that changes how files are read."""
+    """Part of a manifest that determines how files are read."""
     return (manifest or {}).get("sources")

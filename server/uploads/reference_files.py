@@ -1,6 +1,6 @@
-"""References of a session: orientations of another system to compare with, beside the recording, never in it.
+"""References of a session: orientations of another system for comparison, kept separate from the recording.
 
-A file of the same name replaces the one before; a comparison that used that keeps it.
+A file of the same name replaces the previous one; comparisons that used that retain it.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ def list_files(c: Connection, session_id: str) -> list[RecordedFile]:
 
 def get(c: Connection, session_id: str, name: str) -> RecordedFile:
     """One reference; raises NotFound."""
-    found = next((f for f in list_files(c, session_id) if f.name == name), None)
-    if found is None:
+    file = next((f for f in list_files(c, session_id) if f.name == name), None)
+    if file is None:
         raise NotFound("reference", name)
-    return found
+    return file
 
 
 def file_bytes(c: Connection, blobs: BlobStore, session_id: str, name: str) -> bytes:
-    """A reference as uploaded, verified; raises NotFound, IntegrityError."""
-    found = get(c, session_id, name)
-    return blobs.read(sessions.get(c, session_id).patient_id, found.sha256)
+    """Read and verify a reference as uploaded; raises NotFound, IntegrityError."""
+    file = get(c, session_id, name)
+    return blobs.read(sessions.get(c, session_id).patient_id, file.sha256)
 
 
 def remove(c: Connection, actor: audit.Actor | None, session_id: str, name: str) -> None:
-    """Take a reference away; comparisons that used it stay as they are. Raises NotFound."""
+    """Delete a reference; comparisons that used it are unchanged. Raises NotFound."""
     get(c, session_id, name)
     c.execute(delete(reference_file).filter_by(session_id=session_id, name=name))
     audit.record(c, actor, "reference.removed", "session", session_id)
 
 
 class receive_reference(receive):  # noqa: N801 - as `receive`
-    """A reference on its way in; as `receive`."""
+    """Reception of a reference; like `receive`."""
 
     def _check_set(self, c: Connection, size: int) -> None:
-        """The recording's set is not touched."""
+        """No check, as the recording's set is unaffected."""
 
     def _add(self, c: Connection, blob: Blob) -> RecordedFile:
         key = {"session_id": self._session_id, "name": self._name}

@@ -1,12 +1,12 @@
-"""Tables of an upload that nobody has described: what they probably are, and what a person says of them.
+"""Uploaded tables of unknown format: guessed and user-defined mappings.
 
-    list_tables(c, blobs, sid)                  # by shape: columns, first rows, a guess or what was said
-    check_table(c, blobs, sid, name, source)    # do gravity and rates of turn come out right, so read?
-    map_tables(c, actor, sid, names, source)    # the entry for each file, into the manifest
-    find_known(c, blobs, sid)                   # those of a shape that was described before and fits again
+    list_tables(c, blobs, sid)                  # by shape: columns, first rows, guessed or defined mapping
+    check_table(c, blobs, sid, name, source)    # are gravity and angular rates plausible with this mapping?
+    map_tables(c, actor, sid, names, source)    # add the entry of each file to the manifest
+    find_known(c, blobs, sid)                   # shapes with an earlier mapping that fits
 
-A shape is known by an earlier recording of the clinic whose manifest describes a file with the same columns:
-what was said there is the template. Only two megabytes of each file are read, and not verified; the
+A shape is known if the manifest of an earlier recording of the clinic describes a file with the same columns;
+its mapping serves as the template. Only two megabytes of each file are read, without verifying its hash; the
 analysis verifies it.
 """
 
@@ -41,8 +41,8 @@ class TableShape:
 
     Parameters
     ----------
-    files : their names. names : their columns. rows : the first rows of the first of them.
-    source : entry of the manifest's `sources` without `file`; what nobody knows is left out.
+    files : file names. names : column names. rows : the first rows of the first file.
+    source : entry of the manifest's `sources` without `file`; unknown parts are omitted.
     basis : "said" (in this recording), "known" (in an earlier one), "guessed".
     """
 
@@ -55,12 +55,12 @@ class TableShape:
 
 @dataclass(frozen=True)
 class TableReading:
-    """What a sensor gives when its table is read as was said.
+    """Values of a sensor when its table is read with a given mapping.
 
     Parameters
     ----------
     rate_hz : samples per second. at_rest_mps2 : acceleration in its quietest second, None = never still.
-    fastest_radps : rate of turn that it hardly exceeds. problems : what speaks against it, as sentences.
+    fastest_radps : high quantile of the angular rate. problems : implausible results, as sentences.
     """
 
     sensor: str
@@ -71,19 +71,19 @@ class TableReading:
 
 
 def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
-    """Tables of the current recording by their shape; raises NotFound, Conflict no_files."""
+    """Tables of the current recording by shape; raises NotFound, Conflict no_files."""
     this = recordings.require_current(c, session_id)
     shapes: list[TableShape] = []
     for name, look, entry in _tables(this, blobs):
-        said = None if entry is None else _as_template(entry, look)
+        mapping = None if entry is None else _as_template(entry, look)
         for i, shape in enumerate(shapes):
-            if shape.names == look.names and (shape.basis == "said") == (said is not None):
+            if shape.names == look.names and (shape.basis == "said") == (mapping is not None):
                 shapes[i] = replace(shape, files=(*shape.files, name))
                 break
         else:
-            known = None if said else _recall(c, blobs, this, look)
-            source = said or known or dict(look.source)
-            basis = "said" if said else "known" if known else "guessed"
+            template = None if mapping else _recall(c, blobs, this, look)
+            source = mapping or template or dict(look.source)
+            basis = "said" if mapping else "known" if template else "guessed"
             shapes.append(TableShape((name,), look.names, look.rows, source, basis))
     return tuple(shapes)
 
@@ -91,7 +91,7 @@ def list_tables(c: Connection, blobs: BlobStore, session_id: str) -> tuple[Table
 def check_table(
     c: Connection, blobs: BlobStore, session_id: str, name: str, source: Mapping[str, Any]
 ) -> tuple[TableReading, ...]:
-    """Read the beginning of a file as `source` says; raises NotFound, FormatError, ManifestError."""
+    """Read the beginning of a file with `source`; raises NotFound, FormatError, ManifestError."""
     this = recordings.require_current(c, session_id)
     file = next((f for f in _files(this, blobs) if f.name == name), None)
     if file is None:
@@ -106,7 +106,7 @@ def map_tables(
     names: Sequence[str],
     source: Mapping[str, Any],
 ) -> StoredRecording:
-    """Describe tables of one shape in the manifest; raises NotFound, ManifestError, Conflict no_files."""
+    """Add tables of one shape to the manifest; raises NotFound, ManifestError, Conflict no_files."""
     from sagittal.core.formats.table_guess import make_entry  # slow import
 
     this = recordings.require_current(c, session_id)
@@ -114,13 +114,13 @@ def map_tables(
     if missing:
         raise NotFound("file", min(missing))
     manifest = dict(this.manifest or {})
-    others = [s for s in manifest.get("sources") or () if s["file"] not in names]
-    manifest["sources"] = [*(make_entry(source, name) for name in names), *others]
+    remaining = [s for s in manifest.get("sources") or () if s["file"] not in names]
+    manifest["sources"] = [*(make_entry(source, name) for name in names), *remaining]
     return recordings.set_manifest(c, actor, session_id, manifest)
 
 
 def find_known(c: Connection, blobs: BlobStore, session_id: str) -> tuple[TableShape, ...]:
-    """Tables of a known shape where gravity and rates of turn come out right; raises as `list_tables`."""
+    """Tables of a known shape with plausible gravity and angular rates; raises like `list_tables`."""
     return tuple(
         shape
         for shape in list_tables(c, blobs, session_id)
@@ -170,41 +170,41 @@ def _files(this: StoredRecording, blobs: BlobStore) -> Iterator[SourceFile]:
 def _tables(
     this: StoredRecording, blobs: BlobStore
 ) -> Iterator[tuple[str, TableLook, Mapping[str, Any] | None]]:
-    """Name of every table, its look, and the entry of the manifest that describes it."""
+    """Name of every table, its structure, and its entry in the manifest."""
     from sagittal.core.formats import bids  # slow imports
     from sagittal.core.formats.manifest import manifest_of
     from sagittal.core.formats.table_guess import look_into_table
 
-    said = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
-    said = [s for s in said if s.get("columns")]
-    specs = manifest_of({"sources": said}).sources
-    there = {f.name for f in this.files}
+    entries = [s for m in (this.manifest or {}, *_uploaded(this, blobs)) for s in m.get("sources") or ()]
+    entries = [s for s in entries if s.get("columns")]
+    specs = manifest_of({"sources": entries}).sources
+    names = {f.name for f in this.files}
     for file in _files(this, blobs):
-        if bids.is_table(file.name) and bids.find_parts(file.name)[0] in there:
+        if bids.is_table(file.name) and bids.find_parts(file.name)[0] in names:
             continue
         look = look_into_table(file)
         if look is None or not look.source["columns"]:
             continue
-        entry = next((e for e, s in zip(said, specs, strict=True) if s.covers(file.name)), None)
+        entry = next((e for e, s in zip(entries, specs, strict=True) if s.covers(file.name)), None)
         yield file.name, look, entry
 
 
 def _uploaded(this: StoredRecording, blobs: BlobStore) -> Iterator[dict[str, Any]]:
-    """Manifests among the files that can be read."""
+    """Readable manifests among the files."""
     from sagittal.core.formats.json_tree import read_json  # slow imports
     from sagittal.core.formats.manifest import MAX_BYTES, is_manifest, manifest_of
 
     for file in _files(this, blobs):
         if file.name.lower().endswith(".json") and file.size < MAX_BYTES:
             with suppress(InputError, ValueError):
-                found = read_json(file.read())
-                if is_manifest(found):
-                    manifest_of(found)
-                    yield cast("dict[str, Any]", found)
+                tree = read_json(file.read())
+                if is_manifest(tree):
+                    manifest_of(tree)
+                    yield cast("dict[str, Any]", tree)
 
 
 def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableLook) -> dict[str, Any] | None:
-    """What was last said in this clinic of a table with these columns, at the rate that this one names."""
+    """Latest mapping in this clinic of a table with these columns, at the rate given by this one."""
     rows = c.execute(
         select(recording.c.id, recording.c.manifest)
         .where(recording.c.manifest.is_not(None), recording.c.id != this.id)
@@ -219,20 +219,22 @@ def _recall(c: Connection, blobs: BlobStore, this: StoredRecording, look: TableL
                 continue
             earlier = recordings.get(c, row.id)
             if not any(
-                name == entry["file"] and found.names == look.names
-                for name, found, _ in _tables(earlier, blobs)
+                name == entry["file"] and earlier_look.names == look.names
+                for name, earlier_look, _ in _tables(earlier, blobs)
             ):
                 continue
-            said = _as_template(entry, look)
-            return said | ({"rate_hz": look.source["rate_hz"]} if "rate_hz" in look.source else {})
+            mapping = _as_template(entry, look)
+            return mapping | ({"rate_hz": look.source["rate_hz"]} if "rate_hz" in look.source else {})
     return None
 
 
 def _as_template(entry: Mapping[str, Any], look: TableLook) -> dict[str, Any]:
-    """What an entry says of any table of this shape; a sensor that no column names is called as its file."""
+    """Entry as a template for tables of this shape; a sensor not named by a column is named after its
+    file.
+    """
     from sagittal.core.formats.table_guess import THE_FILE  # slow import
 
-    said = {k: v for k, v in entry.items() if k != "file"}
+    template = {k: v for k, v in entry.items() if k != "file"}
     if set(look.source["columns"]) == {THE_FILE} and len(entry["columns"]) == 1:
-        said["columns"] = {THE_FILE: next(iter(entry["columns"].values()))}
-    return said
+        template["columns"] = {THE_FILE: next(iter(entry["columns"].values()))}
+    return template

@@ -1,8 +1,8 @@
-"""Files that come in parts: a broken upload goes on where it stopped, also after the server was killed.
+"""Resumable uploads of files in parts, which survive a restart of the server.
 
-What has come waits as `<id>.part` among the files that are being received and only grows; a part is answered
-when it is on the disk. Once the file is whole and its SHA-256 is the sender's, it gets its name in the store
-by a rename and its row in the session, as a file that came at once.
+Received data are stored as `<id>.part` in the folder of files being received; a part is acknowledged when it
+is on disk. Once the file is complete and its SHA-256 matches, it is renamed to its name in the store and gets
+its row in the session, like a file uploaded at once.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ ABANDONED: Final = dt.timedelta(days=1)
 
 @dataclass(frozen=True)
 class FileUpload:
-    """A file on its way in.
+    """A file being uploaded.
 
     Parameters
     ----------
-    name, size : of the whole file. offset : bytes that are on the server's disk; the next part begins there.
+    name, size : of the complete file. offset : bytes on the server's disk, where the next part begins.
     """
 
     id: str
@@ -53,7 +53,7 @@ def begin(
     name: str,
     size: int,
 ) -> FileUpload:
-    """Announce a file of so many bytes, or find the unfinished upload of one with this name and size.
+    """Announce a file of a given size, or find its unfinished upload by name and size.
 
     Raises
     ------
@@ -66,15 +66,15 @@ def begin(
         raise receiving.make_too_large(name, settings.max_file_bytes)
     with db.write() as c:
         recordings.patient_of(c, session_id)
-        others = 0
+        reserved = 0
         coming = list_coming(c, blobs, session_id)
         for one in coming:
             if (one.name, one.size) == (name, size):
                 return one
-            others += one.size
+            reserved += one.size
         if len(coming) >= settings.max_files:
             raise TooLarge("too_many_files", f"At most {settings.max_files} files come at a time.")
-        receiving.check_set(c, settings, session_id, name, size + others)
+        receiving.check_set(c, settings, session_id, name, size + reserved)
         receiving.require_room(blobs, settings, size)
         fresh = new_id()
         row = {"id": fresh, "session_id": session_id, "name": name, "size": size, "created_at": now()}
@@ -84,7 +84,7 @@ def begin(
 
 
 def list_coming(c: Connection, blobs: BlobStore, session_id: str) -> list[FileUpload]:
-    """The unfinished uploads of a session, the oldest first."""
+    """Unfinished uploads of a session, oldest first."""
     query = _QUERY.where(file_upload.c.session_id == session_id, file_upload.c.finished_sha256.is_(None))
     return [_describe(blobs, row) for row in c.execute(query)]
 
@@ -103,11 +103,11 @@ def add_part(
     offset: int,
     data: bytes,
 ) -> FileUpload:
-    """Add bytes behind those that are there; when this returns they survive a power cut.
+    """Append bytes durably.
 
     Raises
     ------
-    NotFound; Conflict upload_gap: they belong elsewhere; TooLarge beyond what was announced; DiskFull.
+    NotFound; Conflict upload_gap: wrong offset; TooLarge if it exceeds the announced size; DiskFull.
     """
     with blobs.hold_part(upload_id):
         with db.read() as c:
@@ -146,12 +146,13 @@ def finish(
     upload_id: str,
     sha256: str,
 ) -> RecordedFile:
-    """Make the file one of the session's; asked again it answers the same.
+    """Add the complete file to the session; idempotent.
 
     Raises
     ------
-    NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: they are not the
-    sender's, and the upload begins again at 0.
+    NotFound; TooLarge. Conflict upload_incomplete: bytes are missing; upload_damaged: the hash differs,
+    and the upload
+        restarts at 0.
     """
     with blobs.hold_part(upload_id):
         with db.read() as c:
@@ -211,7 +212,7 @@ def _publish(
 def cancel(
     db: Database, blobs: BlobStore, actor: audit.Actor | None, session_id: str, upload_id: str
 ) -> None:
-    """Forget an upload with what came of it; raises NotFound. A finished file stays."""
+    """Delete an upload and its data; raises NotFound. A finished file remains."""
     with blobs.hold_part(upload_id):
         with db.write() as c:
             _find(c, session_id, upload_id)
@@ -221,12 +222,12 @@ def cancel(
 
 
 def list_parts(c: Connection) -> set[str]:
-    """Names of the files of all uploads that are still coming."""
+    """Names of the files of all unfinished uploads."""
     return {BlobStore.name_part(one) for one in c.execute(select(file_upload.c.id)).scalars()}
 
 
 def drop_abandoned(db: Database, blobs: BlobStore) -> None:
-    """Forget uploads to which nothing was added for a day, and those that were finished before."""
+    """Delete uploads idle for a day, and records of finished ones."""
     limit = now() - ABANDONED
     with db.read() as c:
         old = list(c.execute(_QUERY.where(file_upload.c.created_at < limit)))
@@ -253,8 +254,8 @@ def _find(c: Connection, session_id: str, upload_id: str) -> Any:
 
 def _describe(blobs: BlobStore, row: Any) -> FileUpload:
     path = blobs.part(row.id)
-    there = path.stat().st_size if path.exists() else 0
-    return FileUpload(row.id, row.name, row.size, row.size if row.finished_sha256 else min(there, row.size))
+    length = path.stat().st_size if path.exists() else 0
+    return FileUpload(row.id, row.name, row.size, row.size if row.finished_sha256 else min(length, row.size))
 
 
 def _hash(path: Path) -> str:

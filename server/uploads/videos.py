@@ -1,7 +1,7 @@
-"""The video of a take: shown beside the figure, never measured, never in a report.
+"""Video of a trial: shown next to the avatar, never analysed, and not part of reports.
 
-Nobody is filmed by default: a video is taken only with the word of who adds it that the person agreed, and
-that word is kept with it. It goes with its session and its patient. A session has one; another replaces it.
+A video is accepted only if the user who adds it confirms the patient's consent, which is recorded with it. It
+is deleted with its session and patient. A session has one video; another replaces it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class SessionVideo:
 
     Parameters
     ----------
-    offset_s : time in the video at the take's time 0; None until somebody has aligned it.
-    consent_by, consent_at : who said that the person agreed to be filmed, and when.
+    offset_s : video time at trial time 0; None until aligned.
+    consent_by, consent_at : user who confirmed the patient's consent, and time.
     """
 
     session_id: str
@@ -48,30 +48,30 @@ class SessionVideo:
 
 
 def find(c: Connection, session_id: str) -> SessionVideo | None:
-    """The video of a session, None without one."""
+    """Video of a session, None without one."""
     row = c.execute(select(session_video).where(session_video.c.session_id == session_id)).first()
     return None if row is None else SessionVideo(**row._asdict())
 
 
 def get(c: Connection, session_id: str) -> SessionVideo:
-    """The same; raises NotFound for the session and for its video."""
+    """Video of a session; raises NotFound for the session and for its video."""
     sessions.get(c, session_id)
-    found = find(c, session_id)
-    if found is None:
+    video = find(c, session_id)
+    if video is None:
         raise NotFound("video of session", session_id)
-    return found
+    return video
 
 
 def find_stored(c: Connection, blobs: BlobStore, session_id: str) -> tuple[SessionVideo, str]:
-    """A video and the space of its blob; raises NotFound, IntegrityError when it is gone."""
-    found = get(c, session_id)
+    """A video and the space of its blob; raises NotFound, IntegrityError if missing."""
+    video = get(c, session_id)
     space = sessions.get(c, session_id).patient_id
-    blobs.require(space, found.sha256)
-    return found, space
+    blobs.require(space, video.sha256)
+    return video, space
 
 
 def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: float | None) -> SessionVideo:
-    """Say which moment of the video is the take's time 0, None = not known; raises NotFound, bad_value."""
+    """Set the video time at trial time 0, None = unknown; raises NotFound, bad_value."""
     get(c, session_id)
     if offset_s is not None and not (isfinite(offset_s) and abs(offset_s) <= MOST_OFFSET_S):
         raise ServiceError("bad_value", f"The offset is {offset_s} s, expected at most a day either way.")
@@ -81,14 +81,14 @@ def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: f
 
 
 def remove(c: Connection, actor: audit.Actor | None, session_id: str) -> None:
-    """Take the video away; raises NotFound."""
+    """Remove the video; raises NotFound."""
     get(c, session_id)
     c.execute(delete(session_video).where(session_video.c.session_id == session_id))
     audit.record(c, actor, "video.removed", "session", session_id)
 
 
 def require_consent(consent: bool) -> None:
-    """Raise ServiceError no_consent unless the person agreed to be filmed."""
+    """Raise ServiceError no_consent unless the patient's consent is confirmed."""
     if not consent:
         raise ServiceError(
             "no_consent",
@@ -97,16 +97,16 @@ def require_consent(consent: bool) -> None:
 
 
 def find_media_type(begins: bytes) -> str | None:
-    """What a film is, by its first bytes: MP4 and QuickTime say "ftyp", WebM is EBML; None of any other."""
+    """Media type from the first bytes: MP4 and QuickTime have "ftyp", WebM is EBML; otherwise None."""
     if begins[4:8] == b"ftyp":
         return "video/quicktime" if begins[8:12] == b"qt  " else "video/mp4"
     return "video/webm" if begins[:4] == b"\x1a\x45\xdf\xa3" else None
 
 
 class receive_video(receive):  # noqa: N801 - as `receive`
-    """A video on its way in; as `receive`, once `require_consent` has been asked.
+    """Reception of a video; like `receive`, after `require_consent`.
 
-    `offset_s` and `consent_at` are those of SessionVideo, to be set before `keep`; else not known, and now.
+    `offset_s` and `consent_at` as in SessionVideo may be set before `keep`; defaults: unknown, and now.
     """
 
     offset_s: float | None = None
@@ -119,7 +119,7 @@ class receive_video(receive):  # noqa: N801 - as `receive`
         super().write(data)
 
     def keep(self) -> RecordedFile:
-        """Store the video; raises ServiceError no_video when it is none that a browser plays."""
+        """Store the video; raises ServiceError no_video if browsers cannot play it."""
         if find_media_type(self._begins) is None:
             raise ServiceError(
                 "no_video", f"'{self._name}' is no video that browsers play. Expected MP4, QuickTime or WebM."
@@ -127,7 +127,7 @@ class receive_video(receive):  # noqa: N801 - as `receive`
         return super().keep()
 
     def _check_set(self, c: Connection, size: int) -> None:
-        """The recording's set is not touched."""
+        """No check, as the recording's set is unaffected."""
 
     def _add(self, c: Connection, blob: Blob) -> RecordedFile:
         key = {"session_id": self._session_id}

@@ -1,1 +1,1 @@
-"""Poses → viser scene, one server per view, behind our proxy."""
+"""3D views: poses to viser scenes, one server per view, accessible through our proxy."""

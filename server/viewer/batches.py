@@ -32,12 +32,12 @@ holes into its lines."""
 
 
 class DrawnBatch:
-    """Copies of one mesh in the room of a scene.
+    """Instances of one mesh in a scene.
 
     Parameters
     ----------
-    name : of the node in the room. opacity : of all copies; None = 1, and `FAINT` for those not measured.
-    middle : (2,) m, of the floor.
+    name : of the node in the room. opacity : of all instances; None = 1, and `FAINT` for those not measured.
+    middle : (2,) m, centre of the floor.
     """
 
     def __init__(
@@ -67,16 +67,18 @@ class DrawnBatch:
         )
 
     def move(self, wxyz: Single, position: Single) -> None:
-        """Turn (k, 4) and place (k, 3) m all copies in the room; nobody may write into `wxyz` any more."""
+        """Set orientations (k, 4) and positions (k, 3) m of all instances; do not modify `wxyz`
+        afterwards.
+        """
         move_copies(self.handle, wxyz, position - self.origin)
 
 
 class DrawnFigure:
-    """The batches of a figure, or of a ghost, which are moved together.
+    """The batches of an avatar or a ghost, which are moved together.
 
     Parameters
     ----------
-    copies : mesh → its copies among those of all meshes (`FigureLayout.copies`).
+    copies : mesh → indices of its instances among those of all meshes (`FigureLayout.copies`).
     """
 
     def __init__(self, parts: Mapping[PartName, DrawnBatch], copies: Mapping[PartName, slice]) -> None:
@@ -87,7 +89,9 @@ class DrawnFigure:
             self._origins[copies[name]] = part.origin
 
     def move(self, wxyz: Single, position: Single) -> None:
-        """Turn (c, 4) and place (c, 3) m the copies of all meshes; nobody may write into `wxyz` any more."""
+        """Set orientations (c, 4) and positions (c, 3) m of all instances; do not modify `wxyz`
+        afterwards.
+        """
         inside = position - self._origins
         for handle, rows in self._rows:
             move_copies(handle, wxyz[rows], inside[rows])
@@ -99,7 +103,7 @@ def draw_figure(
     suffix: str = "",
     middle: tuple[float, float] = (0.0, 0.0),
 ) -> dict[PartName, DrawnBatch]:
-    """Draw the first frame of a figure; arms are always faint."""
+    """Draw the first frame of an avatar; arms are always faint."""
     return {
         name: DrawnBatch(scene, f"{name}{suffix}", batch, ARMS if name == "arms" else None, middle)
         for name, batch in batches.items()
@@ -112,9 +116,9 @@ def draw_ghost(
     suffix: str = "",
     middle: tuple[float, float] = (0.0, 0.0),
 ) -> dict[PartName, DrawnBatch]:
-    """Draw another walk: its legs and pelvis, pale and without a shadow, on nodes of their own.
+    """Draw another walk as a ghost: legs and pelvis only, pale and without a shadow, on separate nodes.
 
-    Trunk and arms of both would be in the same place, and which leg is which says where it is.
+    The trunks and arms of both would coincide; legs are distinguished by their position.
     """
     return {
         name: DrawnBatch(scene, f"ghost_{name}{suffix}", batch, PALE, middle)
@@ -126,7 +130,7 @@ def draw_ghost(
 def colour_copies(
     batch: MeshBatch, dark: bool, *, grey: bool = False, ghost: bool = False
 ) -> NDArray[np.uint8]:
-    """Return the colours of all copies, (k, 3), as viser takes them; `grey` draws the sides as the body."""
+    """Return the colours of all instances, (k, 3), for viser; `grey` draws the sides like the body."""
     if ghost:
         return np.array([to_linear_rgb(GHOST[dark])] * len(batch.tint), np.uint8)
     tints = ["body" if grey and tint in ("left", "right") else tint for tint in batch.tint]

@@ -1,9 +1,9 @@
-"""The parts of a figure from numbers alone: tables of cross-sections, lofted into one closed mesh per part.
+"""Procedural body parts: tables of cross-sections, lofted into one closed mesh per part.
 
-Every part belongs to one rigid segment and lies in its axes: x forward, y up, z to the right, in m. Origins:
-thigh at the hip centre, shank at the knee centre, foot at the ankle centre, toes where they bend, all else
-midway between the hip centres. Joints stay closed because both neighbours end in a dome about the joint
-centre: whatever the angle, the domes fill it.
+Every part belongs to one rigid segment and uses its axes: x forward, y up, z to the right, in m.
+Origins: thigh at the hip centre, shank at the knee centre, foot at the ankle centre, toes at their
+bend, others midway between the hip centres. Joints remain closed at any angle because both segments end
+in domes about the joint centre.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _ELBOWS: Final = np.deg2rad(16.0)
 
 @lru_cache(maxsize=32)
 def make_parts(body: BodyModel) -> Mapping[PartName, Mesh]:
-    """Return all meshes of a body; thighs and shanks serve both sides, a foot and its toes cannot."""
+    """Return all meshes of a body; thighs and shanks are shared by both sides, feet and toes are not."""
     return {
         "thighs": make_limb(profiles.THIGH, body.thigh, body, 13),
         "shanks": make_limb(profiles.SHANK, body.shank, body, 14),
@@ -75,30 +75,30 @@ def make_foot(body: BodyModel, side: int) -> Mesh:
     r = _stature(body) / 1000
     # the shank turns in a dome about the ankle centre
     u = np.linspace(-np.pi / 2, np.pi / 2, 8)[1:-1]
-    across = np.cos(u)[:, None] * (np.array([17.6, 17.6, 18.2]) * r)
-    dome = loft_sections(np.column_stack((17.6 * r * np.sin(u), 0 * u, across)), 12, (2.0 * r, 2.0 * r))
+    widths = np.cos(u)[:, None] * (np.array([17.6, 17.6, 18.2]) * r)
+    dome = loft_sections(np.column_stack((17.6 * r * np.sin(u), 0 * u, widths)), 12, (2.0 * r, 2.0 * r))
     return join_meshes(_loft_foot(body, side, (-250.0, 1000 * _BALL), 14), dome)
 
 
 def make_toes(body: BodyModel, side: int) -> Mesh:
-    """Return the foot in front of the ball, in the axes of the foot about the ball."""
+    """Return the forefoot, in the axes of the foot about the ball."""
     v, f = _loft_foot(body, side, (1000 * _BALL, 1000 * _TIP), 9)
     return (v - locate_ball(body)).astype(np.float32), f
 
 
 def locate_ball(body: BodyModel) -> Floats:
-    """Return where the toes bend, (3,) m in the axes of the foot."""
+    """Return the position of the toe bend, (3,) m in the axes of the foot."""
     return np.array([_BALL * body.foot, (_KNUCKLE - 1.0) * body.ankle_height, 0.0])
 
 
 def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
-    """Return the least upward bend of the toes, rad, that keeps their tip out of the floor.
+    """Return the smallest upward bend of the toes, rad, that keeps their tip above the floor.
 
-    It is not measured: the floor bends them. A foot in one piece sinks in by up to 6 cm at push-off.
+    It is not measured but caused by the floor. A rigid foot would sink in by up to 6 cm at push-off.
 
     Parameters
     ----------
-    pitch : of the foot, rad, toes up. height : of the ball over the floor, m.
+    pitch : of the foot, rad, toes up. height : of the ball above the floor, m.
     """
     along, under = (_TIP - _BALL - 0.05) * body.foot, _KNUCKLE * body.ankle_height
     # of a moment np.clip alone would take as long as all else
@@ -108,7 +108,7 @@ def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
 
 
 def make_pelvis(body: BodyModel) -> Mesh:
-    """Return the pelvis, as wide as the hip centres ask for."""
+    """Return the pelvis, with a width that matches the hip centres."""
     r = _stature(body) / 1000
     rows = interpolate_rows(profiles.PELVIS, 13) * r
     rows[:, 4:] *= body.hip_width / (HIP_FRACTION * _stature(body))
@@ -116,7 +116,7 @@ def make_pelvis(body: BodyModel) -> Mesh:
 
 
 def make_trunk(body: BodyModel) -> Mesh:
-    """Return trunk, neck and head in one."""
+    """Return trunk, neck and head in one mesh."""
     r = _stature(body) / 1000
     torso = loft_sections(interpolate_rows(profiles.TRUNK, 22) * r, 24, (10 * r, 6 * r), power=(2.35, 2.35))
     rows = interpolate_rows(profiles.HEAD, 15, dense_ends=True) * r
@@ -124,37 +124,37 @@ def make_trunk(body: BodyModel) -> Mesh:
 
 
 def make_arms(body: BodyModel) -> Mesh:
-    """Return both arms hanging at rest: nothing measures them, so they do not move on the trunk."""
+    """Return both arms hanging at rest; they are not measured and do not move relative to the trunk."""
     r = _stature(body) / 1000
     table = profiles.ARM * r
     table[:, 0] *= -1.0
     v, f = loft_sections(interpolate_rows(table[::-1], 17), 12, (9 * r, 20 * r))
     hanging = _bend_forward(v, lambda y: _ELBOWS * _rise((-y / r - 150.0) / 70.0) - np.deg2rad(4.0))
-    both = []
+    meshes = []
     for side in (-1, 1):
         c, s = np.cos(_ARMS_OUT), side * np.sin(_ARMS_OUT)
         turn = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-        both.append((hanging @ turn.T + np.array(profiles.SHOULDER) * [r, r, side * r], f))
-    return join_meshes(*both)
+        meshes.append((hanging @ turn.T + np.array(profiles.SHOULDER) * [r, r, side * r], f))
+    return join_meshes(*meshes)
 
 
 def _stature(body: BodyModel) -> float:
-    """Body height, m, from the thigh, which a person may have had measured."""
+    """Body height, m, estimated from the thigh length, which may have been measured."""
     return body.thigh / THIGH_FRACTION
 
 
 def _hang(rows: Floats, length: float, body: BodyModel) -> Floats:
-    """Rows of a limb's table, in m, from its lower end up."""
+    """Rows of a limb's table, in m, from its lower end upwards."""
     return np.column_stack((-length * rows[:, 0], rows[:, 1:] * _stature(body) / 1000))[::-1]
 
 
-def _loft_foot(body: BodyModel, side: int, between: tuple[float, float], rings: int) -> Mesh:
+def _loft_foot(body: BodyModel, side: int, bounds: tuple[float, float], rings: int) -> Mesh:
     scale = np.array([body.foot, body.ankle_height, body.ankle_height, body.foot, body.foot]) / 1000
-    x, top, bottom, out, inn = (interpolate_rows(profiles.FOOT, rings, between, dense_ends=True) * scale).T
+    x, top, bottom, out, inn = (interpolate_rows(profiles.FOOT, rings, bounds, dense_ends=True) * scale).T
     half = (top - bottom) / 2
     sides = (out, inn) if side > 0 else (inn, out)
     knuckle = _KNUCKLE * body.ankle_height
-    caps = (0.0, knuckle) if between[0] < 0 else (knuckle, 0.0)
+    caps = (0.0, knuckle) if bounds[0] < 0 else (knuckle, 0.0)
     # sections stand across x: what is forward in a loft is up here; squarer below, so that the sole is flat
     sections = np.stack((x, (top + bottom) / 2, half, half, *sides), axis=1)
     v, f = loft_sections(sections, 18, caps, power=(2.0, 4.5))

@@ -1,8 +1,8 @@
-"""Viser's client page: one document for all views, which browsers keep.
+"""Viser's client page: one cacheable document for all views.
 
-As viser ships it, its script lies packed in the page, where nothing can pack it any further. For who takes
-brotli (browsers do over TLS and on localhost) the script stands in the page as it is, and all of that is
-packed: 0.63 MB instead of 0.67. That takes seconds once for a version; meanwhile the other is served.
+In viser's own page the script is already compressed and cannot be compressed further. For clients that accept
+brotli (browsers do over TLS and on localhost) script and style are unpacked and the whole page is compressed:
+0.63 MB instead of 0.67. This takes seconds once per version; meanwhile the original is served.
 """
 
 from __future__ import annotations
@@ -81,29 +81,29 @@ _packing = threading.Lock()
 
 @functools.cache
 def client_page() -> str:
-    """Viser's client page from its wheel, without the control panel, which has no switch of its own."""
+    """Viser's client page from its wheel, without the control panel, which has no option to hide it."""
     return _add_to_head(read_client(), _BEGIN + _QUIET, _HIDE_PANEL)
 
 
 def silence(page: str) -> str:
-    """A page of viser's client that logs no errors or warnings about features Sagittal does not use."""
+    """Modify viser's client page so that it does not log messages about unused features."""
     return _add_to_head(page, _QUIET, "")
 
 
 def _add_to_head(page: str, first: str, last: str) -> str:
-    start, opened, rest = page.partition("<head>")
-    head, closed, body = rest.partition("</head>")
+    start, opened, tail = page.partition("<head>")
+    head, closed, body = tail.partition("</head>")
     return f"{start}{opened}{first}{head}{last}{closed}{body}"
 
 
 @functools.cache
 def client_version() -> str:
-    """What stands in the address of the client page: another one when the page is."""
+    """Version in the URL of the client page, which changes with its content."""
     return hashlib.sha256(client_page().encode()).hexdigest()[:16]
 
 
 def unpack_page(page: str) -> str | None:
-    """The page with its style and script as they are; None where viser packs them in a way unknown here."""
+    """The page with uncompressed style and script; None if viser's packing is unknown."""
     import pyarrow as pa  # slow import
 
     packed, boot = _PACKED.search(page), _BOOT.search(page)
@@ -124,7 +124,7 @@ def unpack_page(page: str) -> str | None:
 
 
 def find_packed_page() -> bytes | None:
-    """The unpacked page as brotli; None as long as it is being made, which the first call begins."""
+    """The unpacked page as brotli; None while it is being created, which the first call starts."""
     folder = os.environ.get(VARIABLE)
     if not folder:
         return None
@@ -137,7 +137,7 @@ def find_packed_page() -> bytes | None:
 
 
 def _pack(file: Path) -> None:
-    """Write the packed page; what fails is tried again by the next start of the server."""
+    """Write the compressed page; a failure is retried at the next start of the server."""
     import brotli
 
     page = unpack_page(client_page())
@@ -152,14 +152,14 @@ def _pack(file: Path) -> None:
 
 
 def _read_digits(text: str, digits: str) -> bytes:
-    """Bytes of a text: each five digits, the highest first, to the base of their number, are four bytes."""
+    """Decode base-N text: each five digits, most significant first, are four bytes."""
     value = np.zeros(128, np.int64)
     value[[ord(c) for c in digits]] = np.arange(len(digits))
-    found = value[np.frombuffer(text.encode("ascii"), np.uint8)]
-    whole = len(found) // 5
+    values = value[np.frombuffer(text.encode("ascii"), np.uint8)]
+    whole = len(values) // 5
     powers = len(digits) ** np.arange(4, -1, -1, dtype=np.int64)
-    start = (found[: 5 * whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
-    rest = 0
-    for digit in found[5 * whole :]:
-        rest = rest * len(digits) + int(digit)
-    return start + rest.to_bytes(8, "big")[8 - max(len(found) % 5 - 1, 0) :]
+    start = (values[: 5 * whole].reshape(-1, 5) @ powers).astype(">u4").tobytes()
+    remainder = 0
+    for digit in values[5 * whole :]:
+        remainder = remainder * len(digits) + int(digit)
+    return start + remainder.to_bytes(8, "big")[8 - max(len(values) % 5 - 1, 0) :]

@@ -43,9 +43,9 @@ FLOOR: Final[Mapping[bool, tuple[Rgb, Rgb]]] = {
 
 
 def to_linear_rgb(colour: Rgb) -> Rgb:
-    """Turn sRGB into the linear RGB that viser expects per instance of a batch (0 to 255).
+    """Convert sRGB to the linear RGB that viser expects per instance of a batch (0 to 255).
 
-    A colour per mesh is taken as sRGB, a colour per instance is not: unconverted it looks washed out.
+    Colours per mesh are interpreted as sRGB, colours per instance are not: unconverted they look washed out.
     Formula: IEC 61966-2-1.
     """
     c = np.asarray(colour) / 255.0

@@ -1,6 +1,6 @@
-"""Rotations of the poses of one moment: sagittal.core.rotation's arithmetic in as few numpy calls as it goes.
+"""Rotations of a few poses: arithmetic of sagittal.core.rotation with a minimum of numpy calls.
 
-Of a handful of quaternions the calls are what costs, not the numbers.
+For a handful of quaternions the overhead of calls dominates.
 """
 
 from __future__ import annotations

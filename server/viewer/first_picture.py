@@ -1,7 +1,7 @@
-"""The first picture of a replay as a drawing, by the camera that the 3D view begins with.
+"""First frame of a replay as an SVG drawing, from the initial camera of the 3D view.
 
-It stands in the page until the 3D view has drawn, which without a graphics processor takes seconds. The same
-parts at the same places: the figure, its shadow, what its feet left on the floor, and the floor's lines.
+It is displayed in the page until the 3D view has rendered, which takes seconds without a graphics processor.
+It shows the same parts in the same places: avatar, shadow, footprints and trails, and floor lines.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ _CSS: Final[dict[Tint, str]] = {"left": "fp-l", "right": "fp-r", "body": "fp-b",
 
 @dataclass(frozen=True, eq=False)
 class _SeenSurface:
-    """A closed surface in the picture: vertices (n, 2) and depth (n,) m, the faces that look at who looks."""
+    """A closed surface in the picture: vertices (n, 2), depth (n,) m, and front faces."""
 
     name: PartName
     css: str
@@ -66,11 +66,11 @@ class _SeenSurface:
 
 
 def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
-    """Draw the frame nearest to a time as `ReplayFigure` shows it first; None where it shows no figure then.
+    """Draw the frame nearest to a time like `ReplayFigure`; None if there is no avatar at that time.
 
     Returns
     -------
-    An SVG as high as its place and centred in it; whatever it is wide, it is cut off or shows more floor.
+    An SVG that fills the height of its container, centred; at other widths it is cropped or shows more floor.
     """
     frame = motion.index(t_s)
     if not motion.valid[frame]:
@@ -98,7 +98,7 @@ def draw_first_picture(motion: ReplayMotion, t_s: float) -> str | None:
 
 
 class _Camera:
-    """A camera of the room: points (n, 3) m → the picture."""
+    """Camera of the scene: points (n, 3) m → the picture."""
 
     def __init__(self, shot: CameraShot) -> None:
         self.eye = np.array(shot.eye)
@@ -109,10 +109,10 @@ class _Camera:
         self._axes = np.stack((right, np.cross(right, sight), sight)).T
 
     def see(self, points: Floats) -> tuple[Floats, Floats]:
-        """Where they are (n, 2), to the right and up from the middle of the picture, and how deep (n,), m."""
-        across, up, ahead = ((points - self.eye) @ self._axes).T
+        """Project points to positions (n, 2), right and up from the centre, and depth (n,), m."""
+        x, up, ahead = ((points - self.eye) @ self._axes).T
         half = np.tan(FOV_RAD / 2) * ahead
-        return HEIGHT / 2 * np.column_stack((across, up)) / half[:, None], ahead
+        return HEIGHT / 2 * np.column_stack((x, up)) / half[:, None], ahead
 
 
 def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[_SeenSurface]:
@@ -123,19 +123,19 @@ def _see_surfaces(motion: ReplayMotion, frame: int, place: Floats, camera: _Came
             opacity = ARMS if name == "arms" else 1.0 if measured else FAINT
             for mesh in meshes:
                 points = mesh[0] @ turns[k].T + batch.position[frame, k] - place
-                seen, depth = camera.see(points)
+                projected, depth = camera.see(points)
                 shadow = None
                 if name not in ("arms", "rings"):
                     fallen = points[:, :2] + points[:, 2:] * SHADOW
                     shadow, _ = camera.see(np.column_stack((fallen, np.zeros(len(fallen)))))
-                shown = find_front(seen, mesh)
+                visible = find_front(projected, mesh)
                 if name == "rings":  # their flat ends are inside the leg
-                    shown &= np.ptp(mesh[0][mesh[1], 1], axis=1) > 0
-                yield _SeenSurface(name, _CSS[tint], opacity, mesh, seen, depth, shown, shadow)
+                    visible &= np.ptp(mesh[0][mesh[1], 1], axis=1) > 0
+                yield _SeenSurface(name, _CSS[tint], opacity, mesh, projected, depth, visible, shadow)
 
 
 def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
-    """From the farthest to the nearest, rings after their leg."""
+    """Sort from farthest to nearest, rings after their leg."""
     far = {id(s): float(s.depth.mean()) for s in surfaces}
     leg = next((far[id(s)] for s in surfaces if (s.name, s.css) == ("shanks", _CSS["right"])), 0.0)
     return sorted(surfaces, key=lambda s: (-leg, 1.0) if s.name == "rings" else (-far[id(s)], 0.0))
@@ -144,9 +144,9 @@ def _order(surfaces: list[_SeenSurface]) -> list[_SeenSurface]:
 def _draw_floor(camera: _Camera, middle: Floats) -> str:
     """Lines of the floor every metre, in front of the camera."""
     path = ""
-    at = np.arange(-LINES_M, LINES_M + 1)
+    positions = np.arange(-LINES_M, LINES_M + 1)
     for axis in (0, 1):
-        for k in at + middle[axis] % 1.0:
+        for k in positions + middle[axis] % 1.0:
             ends = np.zeros((2, 3))
             ends[:, axis], ends[:, 1 - axis] = k, (-LINES_M, LINES_M)
             ahead = camera.see(ends)[1]
@@ -166,8 +166,8 @@ def _draw_trails(motion: ReplayMotion, frame: int, place: Floats, camera: _Camer
         pieces = trail.pieces[max(0, count // CHUNK - 1) * CHUNK : count]
         if len(pieces):
             points = np.concatenate((pieces[:-1:_EVERY, 0], pieces[-1:, 1])) - place
-            seen, ahead = camera.see(points)
-            yield f'<path class="fp-way {_CSS[side]}" d="{_write_line(seen[ahead > _NEAREST_M])}"/>'
+            projected, ahead = camera.see(points)
+            yield f'<path class="fp-way {_CSS[side]}" d="{_write_line(projected[ahead > _NEAREST_M])}"/>'
 
 
 def _draw_prints(motion: ReplayMotion, frame: int, place: Floats, camera: _Camera) -> Iterator[str]:
@@ -177,19 +177,19 @@ def _draw_prints(motion: ReplayMotion, frame: int, place: Floats, camera: _Camer
         path = ""
         for k in range(max(0, count - RECENT_PRINTS), count):
             turn = find_matrices(prints.wxyz[k].astype(np.float64))
-            seen, ahead = camera.see(mesh[0] @ turn.T + prints.position[k] - place)
+            projected, ahead = camera.see(mesh[0] @ turn.T + prints.position[k] - place)
             if ahead.min() > _NEAREST_M:
-                path += _draw(mesh, seen, find_front(seen, mesh))
+                path += _draw(mesh, projected, find_front(projected, mesh))
         if path:
             yield f'<path class="fp-print {_CSS[side]}" d="{path}"/>'
 
 
-def _draw(mesh: Mesh, seen: Floats, shown: Bools) -> str:
-    return "".join(f"{_write_line(seen[line])}z" for line in trace_edges(mesh, shown))
+def _draw(mesh: Mesh, projected: Floats, visible: Bools) -> str:
+    return "".join(f"{_write_line(projected[line])}z" for line in trace_edges(mesh, visible))
 
 
 def _write_line(points: Floats) -> str:
-    """A line through points in whole units, without those that it comes near anyway; "" through none."""
+    """SVG path through rounded points, without negligible vertices; "" for none."""
     if not len(points):
         return ""
     whole = np.rint(points * (1, -1)).astype(int)
@@ -201,22 +201,24 @@ def _write_line(points: Floats) -> str:
 
 
 def _find_corners(points: Floats) -> list[int]:
-    """Indices of the points that a line needs (Douglas and Peucker 1973, doi:10.3138/FM57-6770-U75U-7727)."""
-    kept, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
+    """Indices of the vertices of a simplified line (Douglas and Peucker 1973,
+    doi:10.3138/FM57-6770-U75U-7727).
+    """
+    indices, spans = {0, len(points) - 1}, [(0, len(points) - 1)]
     while spans:
         first, last = spans.pop()
         if last - first < 2:
             continue
         along = points[last] - points[first]
-        away = points[first + 1 : last] - points[first]
+        offsets = points[first + 1 : last] - points[first]
         length = np.hypot(*along)
-        off = abs(_turn(along, away)) / length if length else np.hypot(*away.T)
+        off = abs(_turn(along, offsets)) / length if length else np.hypot(*offsets.T)
         k = int(np.argmax(off))
         if off[k] > _OFF:
             middle = first + 1 + k
-            kept.add(middle)
+            indices.add(middle)
             spans += [(first, middle), (middle, last)]
-    return sorted(kept)
+    return sorted(indices)
 
 
 def _turn(a: Floats, b: Floats) -> Floats:

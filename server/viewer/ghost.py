@@ -1,8 +1,8 @@
-"""Another walk laid over the figure: at the same phase of a stride, in the same place.
+"""Overlay of another walk on the avatar, at the same phase of a stride and in the same place.
 
-Two walks share no time. Each stride of the figure that counts gets a stride of the other visit, in their
-order and from the beginning again when they run out; between its contacts time runs with the phase. A walk
-made of curves is shown at the phases of both legs. Where the figure is in no such stride there is no ghost.
+Two walks share no time axis. Each included stride of the avatar is assigned a stride of the other visit, in
+order and cyclically; between contacts time is scaled by phase. A walk defined by curves is shown at the
+phases of both legs. There is no ghost outside such strides.
 """
 
 from __future__ import annotations
@@ -34,28 +34,29 @@ STANDS_M: Final = 0.15
 
 
 def match_ghost(
-    figure: ReplayMotion, strides: Strides, other: ReplayMotion, other_strides: Strides
+    figure: ReplayMotion, strides: Strides, walk: ReplayMotion, other_strides: Strides
 ) -> GhostMotion | None:
-    """Match another visit to a figure; None when no side has strides that count in both.
+    """Match another visit to an avatar; None if no side has included strides in both.
 
-    Strides of the left lead; those of the right fill in where the left has none, as at the ends of a walk.
+    Left strides determine the match; right ones are used where there is no left one, as at the ends of a
+    walk.
     """
     frames = np.full(len(figure.t_s), -1, np.int64)
     for side in SIDES:
         mine = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
         theirs = [s for s in other_strides.strides if s.side == side and s.excluded_reason is None]
         if mine and theirs:
-            frames = np.where(frames < 0, _frames(figure.t_s, mine, other.t_s, theirs), frames)
-    there = np.maximum(frames, 0)
-    frames[~other.valid[there]] = -1
+            frames = np.where(frames < 0, _frames(figure.t_s, mine, walk.t_s, theirs), frames)
+    indices = np.maximum(frames, 0)
+    frames[~walk.valid[indices]] = -1
     if not (frames >= 0).any():
         return None
-    turn = find_heading(figure) - find_heading(other)[there]
-    return _lay_over(figure, other.batches, other.root, frames, turn)
+    turn = find_heading(figure) - find_heading(walk)[indices]
+    return _lay_over(figure, walk.batches, walk.root, frames, turn)
 
 
 def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk) -> GhostMotion | None:
-    """Match a walk made of curves to a figure; None when it has no stride that counts."""
+    """Match a walk defined by curves to an avatar; None if it has no included stride."""
     steps = np.stack([_count_steps(figure.t_s, strides, side) for side in SIDES], axis=1)
     pairs, frames = np.unique(steps, axis=0, return_inverse=True)
     frames = np.where((steps >= 0).any(axis=1), frames.reshape(-1), -1)
@@ -84,30 +85,30 @@ def _lay_over(
     frames: NDArray[np.int64],
     turn: Floats,
 ) -> GhostMotion:
-    """Turn a walk of n frames by `turn` (m,) rad about its root (n, 2) and put that on the figure's root."""
-    there = np.maximum(frames, 0)
+    """Rotate a walk of n frames by `turn` (m,) rad about its root (n, 2) and move it to the avatar's root."""
+    indices = np.maximum(frames, 0)
     about = rotation.about(2, turn)
-    moved = rotation.rotate(about, _lift(root[there]))
+    moved = rotation.rotate(about, _lift(root[indices]))
     way = (_lift(figure.root) - moved)[:, None]
     about = about[:, None]
 
     def turned(points: Single) -> Floats:
         return rotation.rotate(about, points.astype(np.float64))
 
-    laid = {
+    ghost_batches = {
         name: replace(
             batch,
-            wxyz=rotation.multiply(about, batch.wxyz[there].astype(np.float64)).astype(np.float32),
-            position=(turned(batch.position[there]) + way).astype(np.float32),
+            wxyz=rotation.multiply(about, batch.wxyz[indices].astype(np.float64)).astype(np.float32),
+            position=(turned(batch.position[indices]) + way).astype(np.float32),
         )
         for name, batch in batches.items()
         if batch.ghostly
     }
-    return GhostMotion(laid, frames)
+    return GhostMotion(ghost_batches, frames)
 
 
 def find_heading(motion: ReplayMotion) -> Floats:
-    """Return the direction of the walk in rad at each frame (m,), from the way of the root."""
+    """Return the direction of walking in rad at each frame (m,), from the path of the root."""
     step = float(motion.t_s[1] - motion.t_s[0]) if len(motion.t_s) > 1 else SPAN_S
     half = max(1, round(SPAN_S / 2 / step))
     i = np.arange(len(motion.t_s))
@@ -124,24 +125,24 @@ def _frames(
         like = theirs[k % len(theirs)]
         inside = np.flatnonzero((t_s >= stride.start_s) & (t_s < stride.end_s))
         phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
-        wanted = like.start_s + phase * (like.end_s - like.start_s)
-        after = np.clip(np.searchsorted(other_t_s, wanted), 1, len(other_t_s) - 1)
-        nearer = wanted - other_t_s[after - 1] < other_t_s[after] - wanted
-        frames[inside] = after - nearer
+        times = like.start_s + phase * (like.end_s - like.start_s)
+        upper = np.clip(np.searchsorted(other_t_s, times), 1, len(other_t_s) - 1)
+        nearer = times - other_t_s[upper - 1] < other_t_s[upper] - times
+        frames[inside] = upper - nearer
     return frames
 
 
 def _count_steps(t_s: Floats, strides: Strides, side: Side) -> NDArray[np.int64]:
-    """Phase of a side in steps of 1 / `PHASES` at each time, −1 outside its strides that count."""
-    found = np.full(len(t_s), -1, np.int64)
+    """Phase of a side in steps of 1 / `PHASES` at each time, −1 outside its included strides."""
+    steps = np.full(len(t_s), -1, np.int64)
     for stride in strides.strides:
         if stride.side == side and stride.excluded_reason is None:
             inside = (t_s >= stride.start_s) & (t_s < stride.end_s)
             phase = (t_s[inside] - stride.start_s) / (stride.end_s - stride.start_s)
-            found[inside] = np.rint(PHASES * phase)
-    return found
+            steps[inside] = np.rint(PHASES * phase)
+    return steps
 
 
 def _lift(place: Single) -> Floats:
-    """Points (n, 3) of the floor from places (n, 2) on it, m."""
+    """Convert floor positions (n, 2) to points (n, 3), m."""
     return np.column_stack((place, np.zeros(len(place)))).astype(np.float64)

@@ -1,7 +1,7 @@
-"""Which copies of which mesh a figure is made of, and where each of them is.
+"""Layout of an avatar: mesh instances and their poses.
 
-The same few rigid parts whatever the time: laid out for a whole take or for one moment alike. A part lies in
-the axes of what carries it, so that to place it is to give it the pose of its carrier.
+The same few rigid parts are used at all times, for a whole trial or a single moment. A part is defined in the
+axes of its segment, so placing it means assigning the pose of that segment.
 """
 
 from __future__ import annotations
@@ -59,13 +59,13 @@ _SOLE: Final = 0.25
 
 @dataclass(frozen=True, eq=False)
 class MeshBatch:
-    """Copies of one mesh, k of them in each of m frames.
+    """Instances of one mesh, k of them in each of m frames.
 
     Parameters
     ----------
     wxyz : (m, k, 4). position : (m, k, 3) m, world. tint : k colour roles.
-    measured : k, False where no sensor supports the part and the estimator alone says where it is.
-    ghostly : whether another walk laid over it shows this part too.
+    measured : k, False if the part carries no sensor and its pose is estimated.
+    ghostly : whether a ghost includes this part.
     """
 
     mesh: Mesh
@@ -78,12 +78,12 @@ class MeshBatch:
 
 @dataclass(frozen=True, eq=False)
 class PlacedFigure:
-    """A figure in m frames.
+    """An avatar in m frames.
 
     Parameters
     ----------
-    wxyz : (m, c, 4), position : (m, c, 3) m, world, of the copies of all meshes; `FigureLayout.copies` says
-        which. soles : side → (m, 3) m, world.
+    wxyz : (m, c, 4), position : (m, c, 3) m, world, of the instances of all meshes, as listed in
+        `FigureLayout.copies`. soles : side → (m, 3) m, world.
     """
 
     wxyz: Single
@@ -92,12 +92,12 @@ class PlacedFigure:
 
 
 class FigureLayout:
-    """The parts of a figure.
+    """The parts of an avatar.
 
     Parameters
     ----------
-    segments : those with a pose, in the order in which `place` takes them; parts of others are left out.
-    method : the estimator's, says which of them carry a sensor.
+    segments : segments with a pose, in the order expected by `place`; other parts are omitted.
+    method : estimation method, which determines the instrumented segments.
     """
 
     def __init__(self, segments: Sequence[Segment], body: BodyModel, method: str) -> None:
@@ -105,12 +105,12 @@ class FigureLayout:
         self._body = body
         self._feet = tuple(side for side in SIDES if FOOT[side] in segments)
         self._points = np.array([locate_ball(body), (_SOLE * body.foot, -body.ankle_height, 0.0)])
-        meshes, worn = make_parts(body), _WORN.get(method, self.segments)
+        meshes, instrumented = make_parts(body), _WORN.get(method, self.segments)
         self._parts = {
             name: (
                 meshes[name],
                 copies,
-                tuple(_HANGS.get(carrier, carrier) in worn for carrier, _ in copies),
+                tuple(_HANGS.get(carrier, carrier) in instrumented for carrier, _ in copies),
             )
             for name, all_copies in _PARTS.items()
             if (copies := tuple(x for x in all_copies if _HANGS.get(x[0], x[0]) in segments))
@@ -155,7 +155,7 @@ class FigureLayout:
         )
 
     def divide(self, placed: PlacedFigure) -> dict[PartName, MeshBatch]:
-        """Return mesh → its copies, as they are drawn."""
+        """Return mesh → its instances, for drawing."""
         return {
             name: MeshBatch(
                 mesh,
@@ -178,7 +178,7 @@ def _column(k: int) -> slice:
 
 
 def _stand_up(q: Floats) -> Floats:
-    """Upright axes (..., 4) that face where x of q (..., 4) points: `core.rotation.yaw` in fewer steps."""
+    """Upright axes (..., 4) with the heading of x of q (..., 4), like `core.rotation.yaw` in fewer steps."""
     matrices = find_matrices(q)
     half = 0.5 * np.arctan2(matrices[..., 1, 0], matrices[..., 0, 0])[..., None]
     return np.cos(half) * _NEUTRAL + np.sin(half) * _NEUTRAL_TURNED

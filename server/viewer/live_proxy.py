@@ -1,9 +1,9 @@
-"""The way to the 3D figure of a live session.
+"""Route of the live 3D avatar of a session.
 
     GET /sessions/{sid}/live/figure?dark=…   opens it: {"src": "/views/<id>/"} for an iframe (proxy.py)
 
-The view is shared by all who may run live sessions, one per theme, and is made again after it was stopped: to
-ask for it anew is all a page has to do after its line was cut.
+The view is shared by all users permitted to run live sessions, one per theme, and is recreated after it was
+stopped: a page only needs to request it again after losing its connection.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ async def figure(
     db: Db,
     trail: OpenTrail,
     sid: Id,
-    who: Annotated[Identity, require(Action.RUN_LIVE)],
+    user: Annotated[Identity, require(Action.RUN_LIVE)],
     dark: bool = False,
 ) -> JSONResponse:
-    """Open the live figure of a session."""
+    """Open the live avatar of a session."""
     hub = state_of(request).hub
     body, norm = await asyncio.to_thread(_person, db, sid, hub.owner)
-    await asyncio.to_thread(trail.record_watched, who, "live.watched", "session", sid)
+    await asyncio.to_thread(trail.record_watched, user, "live.watched", "session", sid)
     views: FigureViews = request.app.state.views
 
     def draw(server: viser.ViserServer) -> LiveFigure:
@@ -64,7 +64,7 @@ async def figure(
 
 
 def _person(db: Database, sid: str, owner: live.TakeOwner) -> tuple[BodyModel, NormAt]:
-    """Body of who walks, and the norm curves of a speed; raises NotFound, NodeAway."""
+    """Body model of the patient, and norm curves as a function of speed; raises NotFound, NodeAway."""
     with db.read() as c:
         session = sessions.get(c, sid)
         take = live.current(c, sid)
@@ -82,7 +82,7 @@ def _person(db: Database, sid: str, owner: live.TakeOwner) -> tuple[BodyModel, N
 
 
 def _attend(view: FigureView[LiveFigure], hub: Hub, sid: str, reference: LiveReference) -> None:
-    """Connect a new view with the session's pictures until it ends."""
+    """Subscribe a new view to the session's pictures until it ends."""
     room = hub.room(sid)
 
     def ghost() -> object:
@@ -101,7 +101,7 @@ def _attend(view: FigureView[LiveFigure], hub: Hub, sid: str, reference: LiveRef
 
 
 def _trained(hub: Hub, sid: str) -> Side | None:
-    """The side of the prescription in force."""
+    """Side of the prescription in force."""
     take = hub.take_of(sid)
     side = None if take is None or take.training.prescription is None else take.training.prescription["side"]
     return cast("Side", side) if side in ("left", "right") else None

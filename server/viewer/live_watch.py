@@ -1,6 +1,6 @@
-"""Shows what the estimator says of a session in one live figure, while somebody looks.
+"""Displays the estimator's poses of a session in one live avatar while it is being viewed.
 
-Pictures are shown as they come, newest wins; from one that is half a second old on the figure is grey.
+Pictures are shown as they arrive, only the latest; after half a second without one the avatar turns grey.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ TICK_S: Final = 0.1
 
 
 class FeedFrame(msgspec.Struct, frozen=True):
-    """What of a frame for the browsers (server/live/wire.py) is used here."""
+    """The fields of a frame message (server/live/wire.py) used here."""
 
     method: str
     phase: dict[str, float | None]
@@ -38,12 +38,12 @@ _shown = msgspec.json.Decoder(FeedFrame).decode
 
 
 class LiveWatch:
-    """The way from a session's pictures to one figure; on the event loop.
+    """Connects a session's pictures to one avatar; runs on the event loop.
 
     Parameters
     ----------
-    ghost : what the therapist has chosen now. strides : the last ones as told to the browsers.
-    watched : somebody looks.
+    ghost : returns the therapist's current choice. strides : returns the latest stride messages.
+    watched : returns whether the view has viewers.
     """
 
     def __init__(
@@ -64,19 +64,19 @@ class LiveWatch:
         self._failed = False
 
     def see(self, picture: Picture) -> None:
-        """Take in the newest picture and show it if somebody looks."""
+        """Receive the latest picture and show it if there are viewers."""
         self._newest, self._at, self._is_shown = picture, time.monotonic(), False
         if self._watched():
             self._show(picture)
 
     async def run(self) -> None:
-        """Notice silence, and somebody who begins to look, until cancelled."""
+        """Check for outdated data and new viewers until cancelled."""
         while True:
             await asyncio.sleep(TICK_S)
             self.look()
 
     def look(self) -> None:
-        """Grey what is no longer now; show what came while nobody looked."""
+        """Turn outdated data grey; show a picture received without viewers."""
         if self._newest is None or not self._watched():
             return
         if not self._is_shown:
@@ -85,7 +85,7 @@ class LiveWatch:
             self._figure.set_stale()
 
     def _show(self, picture: Picture) -> None:
-        """Show a picture; a figure that fails may not disturb the take whose pictures it shows."""
+        """Show a picture; errors of the avatar must not affect the trial."""
         self._is_shown = True
         try:
             self._pose(picture)
@@ -107,27 +107,27 @@ class LiveWatch:
                 self._figure.wait()
             return
         # the body lacks its closing brace (messages.Picture)
-        shown = _shown(picture.body + b"}")
-        moment = read_moment(picture, picture.pose, shown)
+        feed_frame = _shown(picture.body + b"}")
+        moment = read_moment(picture, picture.pose, feed_frame)
         self._figure.set_reference(
             self._reference.find(
-                self._ghost(), self._strides(), lambda: find_standing_angles(moment, shown.angles_deg)
+                self._ghost(), self._strides(), lambda: find_standing_angles(moment, feed_frame.angles_deg)
             )
         )
         late = picture.delay_s is None or picture.delay_s > STALE_S
         self._figure.show(moment, late=late)
 
 
-def read_moment(picture: Picture, pose: FigurePose, shown: FeedFrame) -> FigureMoment:
-    """Return poses and phases of a picture; the phases of `shown` come in % and leave as 0 to 1."""
-    phase = {side: shown.phase.get(SUFFIX[side]) for side in SIDES}
+def read_moment(picture: Picture, pose: FigurePose, feed_frame: FeedFrame) -> FigureMoment:
+    """Return poses and phases of a picture; phases in `feed_frame` are in %, the result is 0 to 1."""
+    phase = {side: feed_frame.phase.get(SUFFIX[side]) for side in SIDES}
     return FigureMoment(
         t_s=picture.t_s,
         segments=cast("tuple[Segment, ...]", tuple(pose.segments)),
         q=np.frombuffer(pose.q, np.float32).reshape(-1, 4).astype(np.float64),
         p=np.frombuffer(pose.p, np.float32).reshape(-1, 3).astype(np.float64),
         valid=pose.valid,
-        method=shown.method,
+        method=feed_frame.method,
         contact={cast("Side", side): on for side, on in pose.contact.items()},
         phase={side: None if x is None else x / 100.0 for side, x in phase.items()},
     )

@@ -1,7 +1,7 @@
-"""Poses → the arrays a figure is drawn from, so that showing a moment is only indexing.
+"""Precomputed arrays of an avatar, so that showing a frame only requires indexing.
 
-Everything is float32 and thinned to at most 50 frames a second. The figure is drawn where it stands in the
-room; the smoothed path of its root is kept apart, so that the viewer can follow the person.
+Everything is float32 and reduced to at most 50 frames per second. The avatar is placed in room coordinates;
+the smoothed path of its root is stored separately, so that the camera can follow.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ class ReplayMotion:
 
     Parameters
     ----------
-    t_s : (m,) s. valid : (m,) False where a sensor was lost: nothing is drawn.
-    batches : name → copies of one mesh. segments : those with a pose.
+    t_s : (m,) s. valid : (m,) False where a sensor was lost; such frames are not drawn.
+    batches : name → instances of one mesh. segments : those with a pose.
     root : (m, 2) m, smoothed path on the floor.
-    prints, trails : side → where that foot rested, and its way; no trails unless `placed`.
-    placed : positions are estimates of where the person was in the room, not only for the eye.
-    facing : heading in rad at the first valid frame. ghosts : name → finds a walk that can be laid
-        over it, None where there is none; slow the first time.
+    prints, trails : side → footprints and path of that foot; no trails unless `placed`.
+    placed : positions are estimates in the room, rather than for illustration only.
+    facing : heading in rad at the first valid frame. ghosts : name → function that returns a walk for
+        overlay, None if unavailable; slow the first time.
     """
 
     t_s: Floats
@@ -81,16 +81,16 @@ class ReplayMotion:
 
     @property
     def hidden(self) -> tuple[Segment, ...]:
-        """Segments of the lower body that have no pose and are not drawn."""
+        """Segments of the lower body without a pose, which are not drawn."""
         return tuple(s for s in LOWER_BODY if s not in self.segments)
 
     @property
     def measured(self) -> bool:
-        """Whether sensors support every part of the figure."""
+        """Whether all parts of the avatar are measured by sensors."""
         return all(all(b.measured) for b in self.batches.values())
 
     def index(self, t_s: float) -> int:
-        """Frame nearest to a time; times outside are held at the ends."""
+        """Index of the frame nearest to a time, clipped to the range."""
         i = int(np.searchsorted(self.t_s, t_s))
         if i == 0:
             return 0
@@ -101,12 +101,12 @@ class ReplayMotion:
 
 @dataclass(frozen=True, eq=False)
 class GhostMotion:
-    """Another walk laid over a figure, frame by frame in the same place and direction.
+    """Another walk overlaid on an avatar, with the same position and direction in each frame.
 
     Parameters
     ----------
-    batches : name → copies of one mesh in the m frames of the figure, those that a ghost shows.
-    frames : (m,) frame of the other walk that is shown, −1 where there is none.
+    batches : name → instances of one mesh in the m frames of the avatar, for the parts of a ghost.
+    frames : (m,) corresponding frame of the other walk, −1 if none.
     """
 
     batches: Mapping[PartName, MeshBatch]
@@ -114,12 +114,12 @@ class GhostMotion:
 
 
 def prepare_motion(poses: Poses) -> ReplayMotion:
-    """Lay out everything that is drawn, for all frames at once (about 0.1 s for 10 min; call in a thread).
+    """Lay out everything for all frames at once (about 0.1 s for 10 min; call in a thread).
 
     Raises
     ------
     ParameterError
-        `no_figure` when no segment has a pose.
+        `no_figure` if no segment has a pose.
     """
     if not poses.q or len(poses.t_s) == 0:
         raise ParameterError(
@@ -140,7 +140,7 @@ def prepare_motion(poses: Poses) -> ReplayMotion:
     root = p["pelvis"] if "pelvis" in p else np.mean(list(p.values()), axis=0)
     rate = poses.rate_hz / (keep.step or 1)
     layout = FigureLayout(tuple(q), poses.body, poses.method)
-    placed = layout.place(*(np.stack([of[s] for s in q], axis=1) for of in (q, p)))
+    placed = layout.place(*(np.stack([pose_arrays[s] for s in q], axis=1) for pose_arrays in (q, p)))
     in_room = poses.method not in FOR_THE_EYE
     return ReplayMotion(
         t_s=t_s,
@@ -161,7 +161,7 @@ def prepare_motion(poses: Poses) -> ReplayMotion:
 
 
 def _smooth(path: Floats, window: int) -> Floats:
-    """Moving average over `window` samples, the ends held."""
+    """Moving average over `window` samples, with constant extension at the ends."""
     half = window // 2
     padded = np.concatenate((np.repeat(path[:1], half + 1, 0), path, np.repeat(path[-1:], half, 0)))
     total = np.cumsum(padded, axis=0)
@@ -169,7 +169,7 @@ def _smooth(path: Floats, window: int) -> Floats:
 
 
 def _finite(a: Floats, instead: tuple[float, ...]) -> Floats:
-    """Replace rows before the first valid sample that are not finite; they are never drawn."""
+    """Replace non-finite rows before the first valid sample, which are never drawn."""
     bad = ~np.isfinite(a).all(axis=1)
     if bad.any():
         a = a.copy()

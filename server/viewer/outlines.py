@@ -1,4 +1,4 @@
-"""What is seen of a closed mesh: its surfaces one by one, and the edge of each in a picture."""
+"""Visible outlines of a closed mesh: its surfaces, and their edges in a projection."""
 
 from __future__ import annotations
 
@@ -11,43 +11,43 @@ from sagittal.server.viewer.shapes import Mesh
 
 
 def split_surfaces(mesh: Mesh) -> Iterator[Mesh]:
-    """Return each closed surface of a mesh, as a mesh of its own."""
+    """Yield each closed surface of a mesh as a mesh."""
     vertices, faces = mesh
-    surface, before = np.arange(len(vertices)), None
-    while before is None or (surface != before).any():  # each vertex takes the least number of its faces
-        before = surface
+    surface, previous = np.arange(len(vertices)), None
+    while previous is None or (surface != previous).any():  # each vertex takes the least number of its faces
+        previous = surface
         surface = surface.copy()
-        np.minimum.at(surface, faces, before[faces].min(axis=1)[:, None])
+        np.minimum.at(surface, faces, previous[faces].min(axis=1)[:, None])
     for k in np.unique(surface):
         mine = surface == k
         yield vertices[mine], (np.cumsum(mine) - 1)[faces[mine[faces[:, 0]]]].astype(np.uint32)
 
 
-def find_front(seen: Floats, mesh: Mesh) -> Bools:
-    """Which faces (m,) look at who looks; `seen` (n, 2): the vertices in the picture, to the right and up."""
-    a, b, c = (seen[mesh[1][:, k]] for k in range(3))
+def find_front(projected: Floats, mesh: Mesh) -> Bools:
+    """Mask of front faces (m,); `projected` (n, 2): projected vertices, right and up."""
+    a, b, c = (projected[mesh[1][:, k]] for k in range(3))
     return np.asarray((b - a)[:, 0] * (c - a)[:, 1] > (b - a)[:, 1] * (c - a)[:, 0])
 
 
-def trace_edges(faces: Mesh, shown: Bools) -> list[list[int]]:
-    """Return the closed lines of vertices around the faces that are shown, these to their left.
+def trace_edges(faces: Mesh, visible: Bools) -> list[list[int]]:
+    """Return closed polylines around the visible faces, which lie to their left.
 
-    Filled by the rule "nonzero", they cover what the faces cover, folds and all.
+    Filled with the "nonzero" rule, they cover the same area as the faces, including folds.
     """
-    triangles = faces[1][shown].astype(np.int64)
+    triangles = faces[1][visible].astype(np.int64)
     directed = np.concatenate((triangles[:, :2], triangles[:, 1:], triangles[:, ::2][:, ::-1]))
     count = len(faces[0])
     forth, back = directed @ (count, 1), directed @ (1, count)
-    after: dict[int, list[int]] = {}
+    successors: dict[int, list[int]] = {}
     for a, b in directed[~np.isin(forth, back)].tolist():
-        after.setdefault(a, []).append(b)
+        successors.setdefault(a, []).append(b)
     lines = []
-    while after:
-        line = [next(iter(after))]
-        while line[-1] in after:
-            at = line[-1]
-            line.append(after[at].pop())
-            if not after[at]:
-                del after[at]
+    while successors:
+        line = [next(iter(successors))]
+        while line[-1] in successors:
+            vertex = line[-1]
+            line.append(successors[vertex].pop())
+            if not successors[vertex]:
+                del successors[vertex]
         lines.append(line[:-1])
     return lines

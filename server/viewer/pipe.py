@@ -1,4 +1,4 @@
-"""The way between a browser and a viser server, which keeps out what a viewer need not send."""
+"""Relay between a browser and a viser server, which filters messages that a viewer need not send."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class ViewActivity:
         self._last = time.monotonic()
 
     async def note_activity(self) -> None:
-        """Note that the person did something."""
+        """Register user activity."""
         now = time.monotonic()
         if now - self._last >= CHECK_EVERY_S:
             self._last = now
@@ -47,7 +47,7 @@ class ViewActivity:
 
 
 def is_allowed(message: str | bytes) -> bool:
-    """Tell whether a message of the browser may reach viser."""
+    """Whether a browser message may be forwarded to viser."""
     try:
         content = msgspec.msgpack.decode(message) if isinstance(message, bytes) else None
     except msgspec.DecodeError:

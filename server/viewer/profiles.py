@@ -1,10 +1,9 @@
-"""What the parts of the figure look like across: the tables of cross-sections that `body_parts` lofts.
+"""Tables of cross-sections of the avatar's parts, lofted by `body_parts`.
 
-Columns: place along the part; middle of the section in x; reach forward, back and to either side of it. All
-in thousandths of body height, except the place along a thigh or shank, in fractions of its own length: a long
-shank then keeps its calf below its knee. The lengths that the places follow are those of Drillis and Contini
-(Winter 2009, fig 4.1: shoulders 0.818 H, chin 0.870 H over the floor, upper arm 0.186 H, hips 0.191 H wide);
-girths are for the eye.
+Columns: position along the part; centre of the section in x; extent forward, back and to either side. All in
+thousandths of body height, except the position along a thigh or shank, in fractions of its length, so that a
+long shank has its calf below the knee. Lengths follow Drillis and Contini (Winter 2009, fig 4.1: shoulders
+0.818 H, chin 0.870 H above the floor, upper arm 0.186 H, hip width 0.191 H); girths are illustrative.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""A walk as one HTML file: viser's client with the recorded scene inside, opened without a server.
+"""Self-contained HTML export of a walk: viser's client with the recorded scene, without a server.
 
-It registers itself as the export "walk": drawing stands in this room, exports stand below it.
+Registers itself as the export "walk", since drawing belongs to this package and exports to a lower one.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ TITLE: Final = ("<title>Viser</title>", "<title>Sagittal</title>")
 
 
 def write_walk(content: ExportContent) -> bytes:
-    """Write the figure of an analysis as HTML; raises SagittalError where there is nothing to draw."""
+    """Write the avatar of an analysis as HTML; raises SagittalError if there is nothing to draw."""
     return record_walk(content.poses)
 
 
 def record_walk(poses: Poses) -> bytes:
-    """Draw a walk moment by moment, followed from the right, with footprints and trails."""
+    """Draw a walk frame by frame, followed from the right, with footprints and trails."""
     # a worker that draws nothing does without viser
     from sagittal.server.viewer.client import silence
     from sagittal.server.viewer.motion import prepare_motion

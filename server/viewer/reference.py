@@ -1,7 +1,7 @@
-"""A walk made of curves over the gait cycle, on the body of the person: the norm, or one's own better side.
+"""Reference walk defined by curves over the gait cycle, on the patient's body: the norm or the better side.
 
-Both legs follow the same curves, each at its own phase. Everything that does not depend on the moment is laid
-out once, so that a moment is a look-up, one rotation and the floor.
+Both legs follow the same curves, each at its own phase. Everything independent of time is precomputed, so a
+frame requires only a look-up, one rotation and the floor contact.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class ReferenceWalk:
     Parameters
     ----------
     curves : variable → (n,) rad over the cycle, signs as in the curves of sagittal.core.parameters; the
-        sagittal ones must be there, another that is missing is 0. A pelvis rotation is about the heading.
-    lead : the side whose cycle the pelvis follows.
+        sagittal ones are required, others default to 0. Pelvis rotation is relative to the heading.
+    lead : side whose cycle determines the pelvis.
     """
 
     def __init__(self, curves: Mapping[str, Floats], body: BodyModel, lead: Side = "left") -> None:
@@ -52,15 +52,15 @@ class ReferenceWalk:
             points.append(np.stack(np.broadcast_arrays(hip, knee, ankle, *sole), axis=1))
         self._pelvis = [(float(w), float(x), float(y), float(z)) for w, x, y, z in pelvis]
         # side → row → orientations (3, 4) of a leg, and its points (n, 3)
-        self._turns, self._points = ([list(of) for of in both] for both in (turn, points))
+        self._turns, self._points = ([list(arrays) for arrays in pair] for pair in (turn, points))
 
     def at(self, phases: Phases, place: tuple[float, float], heading: float) -> tuple[Floats, Floats] | None:
-        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, the lower sole on the floor.
+        """Return orientations (7, 4) and positions (7, 3), m, of `SEGMENTS`, lower sole on the floor.
 
         Parameters
         ----------
-        phases : side → 0 to 1; where one is not known, half a cycle from the other. None when neither is.
-        place : m, where the pelvis is. heading : rad, where the walk goes.
+        phases : side → 0 to 1; an unknown one is half a cycle from the other. None if both are unknown.
+        place : position of the pelvis, m. heading : walking direction, rad.
         """
         left, right = (_row(phases, side, self._last) for side in SIDES)
         if left is None or right is None:
@@ -70,15 +70,15 @@ class ReferenceWalk:
     def pose(
         self, left: int, right: int, place: tuple[float, float], heading: float
     ) -> tuple[Floats, Floats]:
-        """As `at`, by the rows of the curves that the legs are at."""
+        """Like `at`, with the curve rows of the legs."""
         pelvis = turn_about_z(heading, self._pelvis[left if self.lead == "left" else right])
         q, p = np.empty((len(SEGMENTS), 4)), np.zeros((len(SEGMENTS), 3))
         q[0] = pelvis
-        before, matrix, lowest = _before(*pelvis), find_matrices(q[0]).T, inf
+        transform, matrix, lowest = _before(*pelvis), find_matrices(q[0]).T, inf
         for k, row in enumerate((left, right)):
             # pelvis ⊗ turn and R(pelvis) point, of a leg at once
             leg = slice(1 + 3 * k, 4 + 3 * k)
-            np.matmul(self._turns[k][row], before, out=q[leg])
+            np.matmul(self._turns[k][row], transform, out=q[leg])
             points = self._points[k][row] @ matrix
             p[leg] = points[:3]
             lowest = min(lowest, *points[:, 2].tolist())
@@ -99,51 +99,52 @@ def stand_upright(body: BodyModel) -> tuple[Floats, Floats]:
 def _row(phases: Phases, side: Side, last: int) -> int | None:
     own = phases.get(side)
     if own is None:
-        other = phases.get("right" if side == "left" else "left")
-        if other is None:
+        opposite = phases.get("right" if side == "left" else "left")
+        if opposite is None:
             return None
-        own = (other + 0.5) % 1.0
+        own = (opposite + 0.5) % 1.0
     return round(last * min(max(own, 0.0), 1.0))
 
 
 def add_standing_angles(
     curves: Mapping[str, Floats], zero: Mapping[str, float], side: Side
 ) -> dict[str, Floats]:
-    """Put the standing angles back into the mean curves of a side, so that both legs can follow them.
+    """Add the standing angles to the mean curves of a side, so that both legs can follow them.
 
     Parameters
     ----------
-    curves : variable → (n,) rad from standing. zero : angle → rad at standing, as `JointAngles.zero_offset`.
+    curves : variable → (n,) rad relative to standing. zero : angle → rad in standing, as
+        `JointAngles.zero_offset`.
     """
     own = 1.0 if side == "right" else -1.0
-    found = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
+    shifted = {name: x for name, x in curves.items() if name == "pelvis_rotation"}
     if "pelvis_tilt" in curves:
-        found["pelvis_tilt"] = curves["pelvis_tilt"] + zero.get("pelvis_tilt", 0.0)
+        shifted["pelvis_tilt"] = curves["pelvis_tilt"] + zero.get("pelvis_tilt", 0.0)
     if "pelvis_obliquity" in curves:
-        found["pelvis_obliquity"] = curves["pelvis_obliquity"] + own * zero.get("pelvis_obliquity", 0.0)
+        shifted["pelvis_obliquity"] = curves["pelvis_obliquity"] + own * zero.get("pelvis_obliquity", 0.0)
     for name in (name for rows in SIGNS.values() for name, _, _ in rows):
         if name in curves:
-            found[name] = curves[name] + zero.get(f"{name}_{SUFFIX[side]}", 0.0)
-    return found
+            shifted[name] = curves[name] + zero.get(f"{name}_{SUFFIX[side]}", 0.0)
+    return shifted
 
 
 def find_better_side(curves: Mapping[Side, Mapping[str, Floats]], norm: Mapping[str, Floats]) -> Side | None:
-    """Return the side whose sagittal curves are more like the norm's in shape, their means removed; rad.
+    """Return the side whose sagittal curves are closer in shape to the norm, with means removed; rad.
 
-    The mean of root mean squares as in `gps_sagittal`, levels left out since ours are from standing. None
-    without both sides and the norm; then there is nothing to choose by.
+    Uses the mean of root mean squares as in `gps_sagittal`, without offsets since our angles are relative to
+    standing. None without both sides and the norm, as there is no basis for a choice.
     """
-    found: dict[Side, float] = {
+    distances: dict[Side, float] = {
         side: sum(_unlike(own[name], norm[name]) for name in SAGITTAL)
         for side, own in curves.items()
         if all(name in own and name in norm for name in SAGITTAL)
     }
-    if len(found) < len(SIDES):
+    if len(distances) < len(SIDES):
         return None
-    return "left" if found["left"] <= found["right"] else "right"
+    return "left" if distances["left"] <= distances["right"] else "right"
 
 
 def _unlike(a: Floats, b: Floats) -> float:
     x = np.linspace(0.0, 1.0, len(a))
-    other = np.interp(x, np.linspace(0.0, 1.0, len(b)), b)
-    return float(np.std(a - other))
+    resampled = np.interp(x, np.linspace(0.0, 1.0, len(b)), b)
+    return float(np.std(a - resampled))

@@ -1,7 +1,7 @@
-"""The room around a figure in a viser scene: floor, light, background, and where it is looked at from.
+"""Scene around an avatar: floor, light, background and camera.
 
-Everything that has a place in the room hangs on one node. To follow the person is to move that node, not the
-camera, so that the hand on the camera and the view that follows never fight.
+Everything with a position in the room is attached to one node. Following the avatar moves that node rather
+than the camera, so that it does not interfere with the user's control of the camera.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ FLOOR_M: Final = 60.0
 
 @dataclass(frozen=True)
 class CameraShot:
-    """A place to look from, in m: at, eye in the scene; fade, section are end and lines of the floor."""
+    """Camera in m: target and eye; fade and section are extent and spacing of the floor lines."""
 
     at: Vector
     eye: Vector
@@ -51,11 +51,11 @@ class CameraShot:
 
 
 class SceneRoom:
-    """An empty room in a viser server of its own.
+    """An empty scene in a dedicated viser server.
 
     Parameters
     ----------
-    floor_m : length of the floor. middle : (2,) m, its middle.
+    floor_m : length of the floor. middle : (2,) m, its centre.
     """
 
     def __init__(
@@ -81,14 +81,14 @@ class SceneRoom:
         server.initial_camera.fov = FOV_RAD
 
     def bring(self, x: float, y: float) -> None:
-        """Bring a place of the floor, m, to where the camera looks."""
+        """Move a position on the floor, m, to the camera target."""
         place = (-x, -y, 0.0)
         if place != self._place:
             self._place = place
             move_node(self._node, place)
 
     def look(self, shot: CameraShot) -> None:
-        """Move the cameras of all who look, and of who comes later, to a shot."""
+        """Set the cameras of current and future clients."""
         self._grid.fade_distance = shot.fade
         self._grid.section_size, self._grid.cell_size = shot.section, shot.section / 5
         initial = self._server.initial_camera
@@ -97,14 +97,14 @@ class SceneRoom:
             client.camera.position, client.camera.look_at = shot.eye, shot.at
 
     def set_dark(self, dark: bool) -> None:
-        """Change to the theme of the page around."""
+        """Change to the theme of the embedding page."""
         self._server.scene.set_background_image(np.full((2, 2, 3), BACKGROUND[dark], np.uint8), format="png")
         self._grid.cell_color, self._grid.section_color = FLOOR[dark]
         self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
 
 
 def frame_person(size: float, facing: float, view: ViewName = "near") -> CameraShot:
-    """Return the shot that has the whole person in the picture.
+    """Return a camera with the whole avatar in view.
 
     Parameters
     ----------

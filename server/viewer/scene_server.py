@@ -1,7 +1,7 @@
-"""viser servers that only this process can reach: they listen on Unix sockets in folders of their own.
+"""viser servers accessible only to this process: they listen on Unix sockets in private folders.
 
-viser asks neither for a cookie nor where a page comes from, and listens on TCP, where every user of the
-machine and every page in a browser on it can knock. A socket file in its owner's folder has neither door.
+viser checks neither cookies nor origins and normally listens on TCP, where any user of the machine and any
+page in a local browser could connect. A socket file in a private folder prevents both.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LONGEST_PATH_BYTES: Final = 100
 
 
 def start_scene_server() -> viser.ViserServer:
-    """Start a viser server in a new folder that only this user may enter.
+    """Start a viser server in a new folder accessible only to this user.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def start_scene_server() -> viser.ViserServer:
 
 
 def socket_of(server: viser.ViserServer) -> Path:
-    """The socket that a scene server listens on."""
+    """Socket of a scene server."""
     return Path(server.get_host())
 
 
@@ -58,9 +58,9 @@ def stop_scene_server(server: viser.ViserServer) -> None:
         shutil.rmtree(socket_of(server).parent)
 
 
-def _no_place(why: str) -> EstimationError:
+def _no_place(reason: str) -> EstimationError:
     return EstimationError(
         "no_place_for_views",
-        f"The server cannot keep 3D views in its folder for temporary files ({why}); "
+        f"The server cannot keep 3D views in its folder for temporary files ({reason}); "
         "an administrator can set TMPDIR to another.",
     )

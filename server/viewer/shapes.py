@@ -1,7 +1,7 @@
-"""Closed smooth surfaces through cross-sections, and the print of a foot.
+"""Smooth closed surfaces through cross-sections, and footprints.
 
-A mesh is (vertices (n, 3) float32, faces (m, 3) uint32), faces counter-clockwise from outside, vertices
-shared between faces so that shading is smooth.
+A mesh is (vertices (n, 3) float32, faces (m, 3) uint32), with faces counter-clockwise from outside and
+vertices shared between faces for smooth shading.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ def loft_sections(
     caps: tuple[float, float] = (0.0, 0.0),
     power: tuple[float, float] = (2.0, 2.0),
 ) -> Mesh:
-    """Return the closed surface through cross-sections along y, with a dome or a flat end.
+    """Return the closed surface through cross-sections along y, with domed or flat ends.
 
     Parameters
     ----------
-    rows : (n, 5 or 6) m: place in y, rising, middle in x, reach forward, back, right and left; without the
-        last column as far to the left as to the right. sides : vertices of a section, four quarters of
+    rows : (n, 5 or 6) m: position in y, increasing, centre in x, extent forward, back, right and left;
+        without the last column left equals right. sides : vertices of a section, four quarters of
         superellipses. caps : height of the dome on the lower and on the upper end, m, 0 = flat.
     power : of the front and of the back half, 2 = ellipse.
     """
@@ -41,8 +41,8 @@ def loft_sections(
     e = 2.0 / np.where(np.cos(a) >= 0, *power)
     c, s = (np.sign(g) * np.abs(g) ** e for g in (np.cos(a), np.sin(a)))
     y, x, front, back, right, left = (col[:, None] for col in rows.T)
-    across = x + np.where(c >= 0, front, back) * c, np.where(s >= 0, right, left) * s
-    v = np.stack((across[0], np.broadcast_to(y, across[1].shape), across[1]), axis=-1).reshape(-1, 3)
+    xs = x + np.where(c >= 0, front, back) * c, np.where(s >= 0, right, left) * s
+    v = np.stack((xs[0], np.broadcast_to(y, xs[1].shape), xs[1]), axis=-1).reshape(-1, 3)
     v = np.concatenate((v, np.column_stack((tips[:, ::-1], np.zeros(2)))))
     j, i = np.arange(sides), np.arange(len(rows) - 1)[:, None] * sides
     p, q, top = (i + j).ravel(), (i + (j + 1) % sides).ravel(), (len(rows) - 1) * sides
@@ -56,15 +56,16 @@ def loft_sections(
 
 
 def interpolate_rows(
-    table: Floats, count: int, between: tuple[float, float] | None = None, *, dense_ends: bool = False
+    table: Floats, count: int, bounds: tuple[float, float] | None = None, *, dense_ends: bool = False
 ) -> Floats:
-    """Return a table (n, k) at `count` places of its first column by monotone cubics: no bulge it has not.
+    """Interpolate a table (n, k) at `count` positions of its first column by monotone cubics.
 
     Source: Fritsch and Butland 1984, doi:10.1137/0905021.
 
     Parameters
     ----------
-    between : first and last place, None = all of the table. dense_ends : more places towards both ends.
+    bounds : first and last position, None = the whole table. dense_ends : denser positions towards both
+        ends.
     """
     x, y = table[:, 0], table[:, 1:]
     h = np.diff(x)[:, None]
@@ -75,26 +76,26 @@ def interpolate_rows(
     with np.errstate(divide="ignore", invalid="ignore"):
         m[1:-1][rising] = ((w1 + w2) / (w1 / d[:-1] + w2 / d[1:]))[rising]
     u = np.linspace(0.0, 1.0, count)
-    low, high = between or (x[0], x[-1])
-    at = low + (high - low) * ((1 - np.cos(np.pi * u)) / 2 if dense_ends else u)
-    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
-    s, span = ((at - x[i]) / h[i, 0])[:, None], h[i]
+    low, high = bounds or (x[0], x[-1])
+    positions = low + (high - low) * ((1 - np.cos(np.pi * u)) / 2 if dense_ends else u)
+    i = np.clip(np.searchsorted(x, positions, side="right") - 1, 0, len(h) - 1)
+    s, span = ((positions - x[i]) / h[i, 0])[:, None], h[i]
     value = (1 + 2 * s) * (1 - s) ** 2 * y[i] + s * (1 - s) ** 2 * span * m[i]
     value += s * s * (3 - 2 * s) * y[i + 1] - s * s * (1 - s) * span * m[i + 1]
-    return np.column_stack((at, value))
+    return np.column_stack((positions, value))
 
 
 def join_meshes(*meshes: tuple[NDArray[np.floating], NDArray[np.integer]]) -> Mesh:
-    """Return several closed surfaces as one mesh; where they overlap, the nearer one is seen."""
+    """Merge several closed surfaces into one mesh."""
     start = np.cumsum([0, *(len(v) for v, _ in meshes)])
     faces = [f + k for (_, f), k in zip(meshes, start, strict=False)]
     return np.concatenate([v for v, _ in meshes]).astype(np.float32), np.concatenate(faces).astype(np.uint32)
 
 
 def make_footprint(length: float, side: Side, points: int = 48) -> Mesh:
-    """Return the outline of a flat sole facing +z: x to the toes, z = 0, origin in the middle of its length.
+    """Return the outline of a flat sole facing +z: x to the toes, z = 0, origin at mid-length.
 
-    Narrow at the arch on the inner side, the toes drawn inwards; proportions are for the eye only.
+    Narrow at the medial arch, with toes pointing inwards; proportions are illustrative.
     """
     s = -np.cos(np.linspace(0.0, np.pi, points))
     half = (0.155 + 0.025 * s) * np.sqrt(1.0 - s**4)

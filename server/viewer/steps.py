@@ -1,4 +1,4 @@
-"""Where the feet went and where they rested, laid out once so that a moment of the replay is only a count."""
+"""Paths and rest positions of the feet, precomputed so that a frame of the replay only needs a count."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ Single = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class FootTrail:
-    """The way of one foot over the whole take.
+    """Path of one foot over the whole trial.
 
     Parameters
     ----------
-    t_s : (k,) s, increasing, when the foot had gone a piece. pieces : (k, 2, 3) m, from and to, world.
+    t_s : (k,) s, increasing, end time of each piece. pieces : (k, 2, 3) m, start and end, world.
     """
 
     t_s: Floats
@@ -44,12 +44,12 @@ class FootTrail:
 
 @dataclass(frozen=True, eq=False)
 class FootPrints:
-    """The footprints of one foot.
+    """Footprints of one foot.
 
     Parameters
     ----------
-    t_s : (c,) s, increasing, when the foot rested. position : (c, 3) m, middle of the sole on the floor,
-    world. wxyz : (c, 4) turned about the vertical only, x to the toes.
+    t_s : (c,) s, increasing, times of rest. position : (c, 3) m, middle of the sole on the floor, world. wxyz
+        : (c, 4) rotated about the vertical only, x to the toes.
     """
 
     t_s: Floats
@@ -58,23 +58,24 @@ class FootPrints:
 
 
 def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
-    """Lay a path (n, 3) out in pieces; where samples are not valid there is a gap."""
+    """Divide a path (n, 3) into line segments, with gaps where samples are invalid."""
     stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
     # the first and last sample of every valid run are kept, so that a piece never reaches over a gap
     edge = valid & ~(np.append(valid[1:], False) & np.append(False, valid[:-1]))
-    kept = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
+    indices = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
     lost = np.cumsum(~valid)
-    whole = lost[kept[1:]] == lost[kept[:-1]]
-    points = path[kept].astype(np.float32)
+    whole = lost[indices[1:]] == lost[indices[:-1]]
+    points = path[indices].astype(np.float32)
     points[:, 2] = np.maximum(points[:, 2], CLEAR_M)
-    return FootTrail(t_s[kept[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
+    return FootTrail(t_s[indices[1:]][whole], np.stack((points[:-1], points[1:]), axis=1)[whole])
 
 
 def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single, q: Floats) -> FootPrints:
-    """Find one print for every time the foot rested on the floor, at its slowest moment.
+    """Find one footprint for every rest of the foot on the floor, at its lowest speed.
 
-    A contact is searched for several rests, since a step in it may have been missed, and has one at least.
+    Each contact contains at least one rest; several are possible, since a step within it may have been
+    missed.
 
     Parameters
     ----------
@@ -82,21 +83,21 @@ def find_prints(t_s: Floats, valid: Bools, contact: Bools, path: Floats | Single
     """
     n = len(t_s)
     half = max(1, round(_REST_WINDOW_S / 2 * n / max(t_s[-1] - t_s[0], _REST_WINDOW_S)))
-    before, after = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half, n - 1)
-    way = np.linalg.norm(path[after] - path[before], axis=1)
-    speed = way / np.maximum(t_s[after] - t_s[before], _REST_WINDOW_S / 2)
+    lower, upper = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half, n - 1)
+    way = np.linalg.norm(path[upper] - path[lower], axis=1)
+    speed = way / np.maximum(t_s[upper] - t_s[lower], _REST_WINDOW_S / 2)
     down = contact & valid
     slow = down & (speed < REST_MPS)
     slow[_slowest(down, speed)] = True
-    rest: list[int] = []
-    for at in _slowest(slow, speed):
-        if not rest or np.hypot(*(path[at] - path[rest[-1]])[:2]) > SAME_M:
-            rest.append(at)
-    position = path[rest].astype(np.float32)
+    rests: list[int] = []
+    for index in _slowest(slow, speed):
+        if not rests or np.hypot(*(path[index] - path[rests[-1]])[:2]) > SAME_M:
+            rests.append(index)
+    position = path[rests].astype(np.float32)
     position[:, 2] = CLEAR_M
-    return FootPrints(t_s[rest], position, rotation.about(2, rotation.yaw(q[rest])).astype(np.float32))
+    return FootPrints(t_s[rests], position, rotation.about(2, rotation.yaw(q[rests])).astype(np.float32))
 
 
-def _slowest(where: Bools, speed: Floats) -> list[int]:
-    """Index of the least speed in every run of a mask."""
-    return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(where)]
+def _slowest(mask: Bools, speed: Floats) -> list[int]:
+    """Index of the lowest speed in every run of a mask."""
+    return [int(start + np.argmin(speed[start:end])) for start, end in find_runs(mask)]

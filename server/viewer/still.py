@@ -1,4 +1,4 @@
-"""One moment of the figure as a drawing for paper: its parts in outline, seen from the side of one leg."""
+"""One frame of the avatar as a drawing for print: outlined parts, seen from one side."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ FAINT: Final = "st-f"
 
 
 def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
-    """Draw the figure at a moment; None where a sensor was lost then, or nothing has a pose.
+    """Draw the avatar at a time; None if a sensor was lost then, or no segment has a pose.
 
     Parameters
     ----------
-    near : leg that is in front. title : for those who hear the page.
+    near : leg nearer to the viewer. title : for screen readers.
     """
     frame = min(int(np.searchsorted(poses.t_s, t_s)), len(poses.t_s) - 1)
     segments = tuple(poses.q)
@@ -43,19 +43,19 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
         turns = find_matrices(batch.wxyz[0].astype(np.float64))
         for k, (tint, measured) in enumerate(zip(batch.tint, batch.measured, strict=True)):
             for mesh in split_surfaces(batch.mesh):
-                seen, depth = _project(mesh[0] @ turns[k].T + batch.position[0, k], front, near)
-                outlines = [seen[line] for line in trace_edges(mesh, find_front(seen, mesh))]
+                projected, depth = _project(mesh[0] @ turns[k].T + batch.position[0, k], front, near)
+                outlines = [projected[line] for line in trace_edges(mesh, find_front(projected, mesh))]
                 parts.append((depth, CSS[tint] if measured else f"{CSS[tint]} {FAINT}", outlines))
     parts.sort(key=lambda part: -part[0])
     return _write([(css, outlines) for _, css, outlines in parts if outlines], title)
 
 
 def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
-    """Points (n, 2) m, to the right and up, and how far from who looks they are in the mean."""
+    """Points (n, 2) m, right and up, and their mean distance from the viewer."""
     along = front / np.linalg.norm(front) * (1.0 if near == "right" else -1.0)
-    away = np.array([-along[1], along[0]])  # to the left of who looks along `along`
+    normal = np.array([-along[1], along[0]])  # to the left of who looks along `along`
     flat = np.column_stack((points[:, :2] @ along, points[:, 2]))
-    return flat, float((points[:, :2] @ away).mean())
+    return flat, float((points[:, :2] @ normal).mean())
 
 
 def _write(parts: list[tuple[str, list[Floats]]], title: str) -> str:

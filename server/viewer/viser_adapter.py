@@ -1,8 +1,8 @@
-"""All that we know of viser's insides: no other module reads its private names or its client's build.
+"""Adapter to viser's internals: no other module uses its private names or its client's build.
 
-Pictures of a figure go through it with less than its public setters send: a node is moved by one message, a
-picture wakes it once. It listens on Unix sockets. tests/server/viewer/test_viser_adapter.py holds it, and
-`require_known_viser` says at the start of the server when an installed version has moved what is used here.
+Avatar updates use lower-level calls than viser's public setters: a node is moved with one message, and a
+frame wakes viser once. It listens on Unix sockets. Verified by tests/server/viewer/test_viser_adapter.py, and
+at startup `require_known_viser` reports a version of viser in which the required names have changed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from sagittal.server.viewer.steps import Single
 
 
 class UnknownViserError(SagittalError):
-    """The installed viser is none that this version of Sagittal knows; the message says what is missing."""
+    """The installed viser is unsupported; the message names the missing part."""
 
     def __init__(self, missing: str) -> None:
         super().__init__(
@@ -65,22 +65,21 @@ class ArraysChanged(  # type: ignore[call-arg]  # viser's types are not looked a
     entity=EntityLifecycle("scene", "update_dict", "name"),
     include_in_scene_serialization=True,
 ):
-    """viser's message of new properties, of which it is known that they are arrays of float32, C-contiguous,
-    and always the same ones of a node.
+    """viser's property update, restricted to C-contiguous float32 arrays of fixed properties.
 
-    viser asks of every field of every message what it is: a third of the time a frame takes.
+    viser inspects the type of every field of every message, which takes a third of the time of a frame.
     """
 
     def redundancy_key(self) -> str:
-        """The newest of a node replaces the one before."""
+        """The latest message of a node replaces earlier ones."""
         return f"scene:{self.name}:arrays"
 
     def entity_state_key(self) -> tuple[str, str]:
-        """It goes when its node does."""
+        """The message is dropped with its node."""
         return "scene", self.name
 
     def as_serializable_dict(self, binary_buffers: list[memoryview] | None = None) -> dict[str, Any]:
-        """Say the same as viser's own message."""
+        """Serialize like viser's own message."""
         updates: dict[str, Any] = {}
         for name, array in self.updates.items():
             if binary_buffers is None:
@@ -92,10 +91,10 @@ class ArraysChanged(  # type: ignore[call-arg]  # viser's types are not looked a
 
 
 def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single) -> None:
-    """Turn (k, 4) and place (k, 3) all copies by one message; the public setters take one each.
+    """Set orientations (k, 4) and positions (k, 3) of all instances with one message instead of two.
 
-    A message is what a frame costs, not its bytes. The arrays must be C-contiguous and are kept: nobody may
-    write into them any more.
+    The number of messages, not of bytes, determines the cost of a frame. The arrays must be C-contiguous and
+    must not be modified afterwards.
     """
     inside = handle._impl  # noqa: SLF001
     props = inside.props
@@ -105,7 +104,7 @@ def move_copies(handle: viser.BatchedMeshHandle, wxyz: Single, position: Single)
 
 
 def draw_lines(handle: viser.LineSegmentsHandle, points: Single) -> None:
-    """Draw other lines (n, 2, 3) of as many pieces, if they are others; as `move_copies`."""
+    """Replace lines (n, 2, 3) by an equal number of others, if different; like `move_copies`."""
     inside = handle._impl  # noqa: SLF001
     if np.array_equal(inside.props.points, points):
         return
@@ -114,16 +113,16 @@ def draw_lines(handle: viser.LineSegmentsHandle, points: Single) -> None:
 
 
 def gather_longer(server: viser.ViserServer) -> None:
-    """Let the server's thread sleep between pictures; what is to be seen sooner is sent by `show_at_once`."""
+    """Let the server's thread sleep between frames; urgent updates are sent by `show_at_once`."""
     server._websock_server.get_message_buffer().window_duration_sec = WINDOW_S  # noqa: SLF001
 
 
 @contextmanager
 def show_at_once(server: viser.ViserServer) -> Iterator[None]:
-    """Send all that is changed inside together and at once.
+    """Send all changes made within the context together and immediately.
 
-    viser's `atomic` and `flush` do the same and wake its thread twice. Both its events are set: it may have
-    looked in vain since the last change, and then waits for the next one, not for a flush.
+    viser's `atomic` and `flush` do the same but wake its thread twice. Both its events are set: it may have
+    checked since the last change and then waits for the next one, not for a flush.
     """
     buffer = server._websock_server.get_message_buffer()  # noqa: SLF001
     buffer.atomic_start()
@@ -143,24 +142,24 @@ def _wake(buffer: Any) -> None:
 
 
 def move_node(handle: viser.SceneNodeHandle, place: tuple[float, float, float]) -> None:
-    """Move a node; the public setter casts and compares first, which takes longer than to move a part."""
+    """Move a node; the public setter's cast and comparison take longer than the move."""
     inside = handle._impl  # noqa: SLF001
     inside.position[:] = place
     inside.api._queue_scene_message(SetPositionMessage(inside.name, place))  # noqa: SLF001
 
 
 def forbid_sharing(server: viser.ViserServer) -> None:
-    """Let no client ask for a public tunnel through a third party; the proxy drops the request, too."""
+    """Prevent clients from requesting a public tunnel; the proxy also drops the request."""
     server._websock_server.unregister_handler(ShareUrlRequest)  # noqa: SLF001
 
 
 def read_client() -> str:
-    """Viser's client page, as its wheel has it.
+    """Viser's client page from its wheel.
 
     Raises
     ------
     UnknownViserError
-        it is not there, or has no head to which anything could be added.
+        it is missing, or has no head element to extend.
     """
     try:
         page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_text(encoding="utf-8")
@@ -172,7 +171,7 @@ def read_client() -> str:
 
 
 def require_known_viser() -> None:
-    """Raise UnknownViserError where the installed viser lacks what is used here."""
+    """Raise UnknownViserError if the installed viser lacks required names."""
     for home, names in _USED.items():
         for name in names:
             if not hasattr(home, name):
@@ -181,7 +180,7 @@ def require_known_viser() -> None:
 
 
 def _serve(handler: Any, host: str, port: int, **options: Any) -> Any:
-    """Listen as viser asks to, on a Unix socket if the host is a path."""
+    """Listen as requested by viser, or on a Unix socket if the host is a path."""
     if host.startswith("/"):
         return websockets.asyncio.server.unix_serve(handler, host, **options)
     return websockets.asyncio.server.serve(handler, host, port, **options)

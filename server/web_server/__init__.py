@@ -1,1 +1,1 @@
-"""How connections reach the application: the listening socket, their limits, and the proxies in front."""
+"""Network front end: listening socket, connection limits and trusted proxies."""

@@ -1,4 +1,4 @@
-"""Puts the web server together: uvicorn with our connections, limits and proxies."""
+"""Assembles the web server: uvicorn with our connections, limits and proxies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GRACE_S = 4
 
 
 def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> uvicorn.Server:
-    """Return a server of an application; `run` it on sockets of `open_listener`."""
+    """Return a server for an application; `run` it on sockets of `open_listener`."""
     return uvicorn.Server(
         uvicorn.Config(
             TrustedProxies(app, settings.proxies) if settings.proxies else app,

@@ -1,9 +1,9 @@
-"""One HTTP connection with an end to its patience: half a request does not hold a connection for ever.
+"""HTTP connections with timeouts, so that incomplete requests do not hold a connection indefinitely.
 
-uvicorn closes a connection that is idle between two requests, and only that. Here the head of a request has a
-time to come in, its body a least rate, and an answer that waits to be read must go on leaving. None of this
-says how long an answer may take: event streams and websockets are as old as their readers like. A body that
-we are slow to read is not the sender's fault.
+uvicorn only closes connections that are idle between two requests. Here request headers have a deadline,
+bodies a minimum rate, and responses must keep being read by the client. None of this limits the duration of a
+response: event streams and websockets may stay open. A body that we read slowly is not held against the
+client.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ _full: Final = SeldomLog()
 
 @dataclass(frozen=True)
 class ConnectionLimits:
-    """What connections may take.
+    """Limits of a connection.
 
     Parameters
     ----------
-    most : connections at once; the next is answered 503 and closed.
-    head_s : time for the first line and the headers of a request.
-    body_s, body_bytes : of a body at least so many bytes come in each such time, or all that is left.
-    unread_s : some of an answer that fills all buffers is read in each such time.
+    most : simultaneous connections; further ones are answered with 503 and closed.
+    head_s : time limit for the request line and headers.
+    body_s, body_bytes : minimum rate of a body: bytes per interval, or the remainder.
+    unread_s : time limit for reading part of a response that fills all buffers.
     """
 
     most: int = 1000
@@ -40,7 +40,7 @@ class ConnectionLimits:
 
 
 class TimedConnection(H11Protocol):
-    """uvicorn's HTTP/1.1 connection within limits; `make_connection_class` makes the class of a server."""
+    """uvicorn's HTTP/1.1 protocol with limits; `make_connection_class` creates the class for a server."""
 
     limits = ConnectionLimits()
 
@@ -54,7 +54,7 @@ class TimedConnection(H11Protocol):
         self._upgraded = False
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Take a connection, or refuse it when there are too many."""
+        """Accept a connection, or reject it if there are too many."""
         super().connection_made(transport)
         if len(self.connections) > self.limits.most:
             _full.warn(f"{self.limits.most} connections are open, the most there may be: others are refused.")
@@ -63,34 +63,34 @@ class TimedConnection(H11Protocol):
             self._watch()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Forget the timers."""
+        """Cancel the timers."""
         self._stop_timer()
         self._stop_unread_timer()
         super().connection_lost(exc)
 
     def data_received(self, data: bytes) -> None:
-        """Take what came."""
+        """Process received data."""
         self._came += len(data)
         super().data_received(data)
         self._watch()
 
     def pause_writing(self) -> None:
-        """Wait until the client has read some of the answer, and not for ever."""
+        """Wait until the client has read part of the response, up to a timeout."""
         super().pause_writing()
         self._watch_unread()
 
     def resume_writing(self) -> None:
-        """Go on with the answer."""
+        """Resume sending the response."""
         super().resume_writing()
         self._stop_unread_timer()
 
     def on_response_complete(self) -> None:
-        """Go on to the next request."""
+        """Continue with the next request."""
         super().on_response_complete()
         self._watch()
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
-        """Hand the connection to the websocket, which has pings of its own."""
+        """Hand the connection over to the websocket protocol, which has its own pings."""
         self._upgraded = True
         self._stop_unread_timer()
         super().handle_websocket_upgrade(event)
@@ -99,7 +99,7 @@ class TimedConnection(H11Protocol):
             self._refuse(400, "This is no websocket handshake: send a GET without a body and fewer headers.")
 
     def _watch(self) -> None:
-        """Run the timer of what is awaited from the client now."""
+        """Run the timer for the data currently expected from the client."""
         awaited = self._what_is_awaited()
         if awaited == self._awaited:
             return
@@ -137,9 +137,9 @@ class TimedConnection(H11Protocol):
             self.limits.unread_s, self._end_unread, self.transport.get_write_buffer_size()
         )
 
-    def _end_unread(self, before: int) -> None:
+    def _end_unread(self, unread: int) -> None:
         # one answer may be long: on a slow line it leaves in many windows
-        if self.transport.get_write_buffer_size() < before:
+        if self.transport.get_write_buffer_size() < unread:
             self._watch_unread()
         else:
             self.transport.abort()
@@ -150,7 +150,7 @@ class TimedConnection(H11Protocol):
             self._unread_timer = None
 
     def _is_held_back(self) -> bool:
-        """Whether the client waits for us and not we for it."""
+        """Whether the client is waiting for us rather than we for it."""
         return self.flow.read_paused or self.cycle.waiting_for_100_continue
 
     def _head_is_late(self) -> None:
@@ -160,7 +160,7 @@ class TimedConnection(H11Protocol):
             self.transport.close()  # browsers open connections in advance, and an answer would puzzle them
 
     def _refuse(self, status: int, detail: str) -> None:
-        """Answer as far as that is still possible and close."""
+        """Send an error response if still possible, and close."""
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
             headers = [
                 (b"content-type", b"text/plain; charset=utf-8"),
@@ -188,5 +188,5 @@ class TimedConnection(H11Protocol):
 
 
 def make_connection_class(limits: ConnectionLimits) -> type[TimedConnection]:
-    """The class of connections within these limits."""
+    """Connection class with these limits."""
     return type("LimitedConnection", (TimedConnection,), {"limits": limits})

@@ -1,4 +1,4 @@
-"""The listening socket: small answers leave at once; without descriptors only newcomers are sent away."""
+"""Listening socket: sends small responses immediately; rejects new connections if out of descriptors."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ log = logging.getLogger(__name__)
 
 
 class SeldomLog:
-    """Says what an outsider can make happen again and again, once a minute, with how often it was."""
+    """Rate-limited log for events that clients can trigger: at most one line a minute, with a count."""
 
     def __init__(self, every_s: float = 60.0) -> None:
         self._every_s = every_s
@@ -31,7 +31,7 @@ class SeldomLog:
         self._lock = threading.Lock()
 
     def warn(self, text: str) -> None:
-        """Log a warning, or count it for the next."""
+        """Log a warning, or count it for the next one."""
         with self._lock:
             now = time.monotonic()
             if now < self._next_s:
@@ -42,14 +42,14 @@ class SeldomLog:
 
 
 class ListeningSocket(socket.socket):
-    """A listening TCP socket for an asyncio server.
+    """Listening TCP socket for an asyncio server.
 
-    Its protocol number is given, not 0: only then asyncio sets TCP_NODELAY on what it accepts, without which
-    each small answer waits some 40 ms for an acknowledgement.
+    Its protocol number is set explicitly: with 0, asyncio does not set TCP_NODELAY on accepted connections,
+    and each small response waits some 40 ms for an acknowledgement.
 
-    Without a free descriptor asyncio leaves a connection in the queue, asks 2,048 times again and writes a
-    traceback for each. Here one descriptor is kept in reserve: it is given up for as long as it takes to
-    accept that connection and close it.
+    Without a free descriptor asyncio leaves a connection in the queue, retries 2,048 times and logs a
+    traceback for each. Here one descriptor is kept in reserve and released for as long as it takes to accept
+    that connection and close it.
     """
 
     def __init__(self, family: socket.AddressFamily) -> None:
@@ -64,7 +64,7 @@ class ListeningSocket(socket.socket):
         Raises
         ------
         ConnectionAbortedError
-            it was closed at once for want of descriptors; the next may come.
+            closed immediately for lack of descriptors; further ones may succeed.
         """
         try:
             return super().accept()
@@ -109,7 +109,7 @@ def open_listener(host: str, port: int) -> ListeningSocket:
     Raises
     ------
     OSError
-        the port cannot be used; the message says what to do.
+        the port cannot be used; the message contains a remedy.
     """
     listener = ListeningSocket(socket.AF_INET6 if ":" in host else socket.AF_INET)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -124,13 +124,13 @@ def open_listener(host: str, port: int) -> ListeningSocket:
 
 
 def make_room(connections: int) -> int:
-    """Raise this process's limit of descriptors for so many connections; returns how many it has room for."""
+    """Raise the descriptor limit for this many connections; return the number that fits."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft == resource.RLIM_INFINITY:
         return connections
-    wanted = RESERVED + PER_CONNECTION * connections
-    if soft < wanted:
-        soft = wanted if hard == resource.RLIM_INFINITY else min(wanted, hard)
+    descriptors = RESERVED + PER_CONNECTION * connections
+    if soft < descriptors:
+        soft = descriptors if hard == resource.RLIM_INFINITY else min(descriptors, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
     # a limit below the reserve is met by the spare descriptor of the listener
     room = max((soft - RESERVED) // PER_CONNECTION, soft // (2 * PER_CONNECTION))

@@ -1,4 +1,4 @@
-"""Whose word about the client we take: the proxies that the operator names, and nobody else's."""
+"""Trusts forwarded client addresses only from the proxies configured by the operator."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ FORWARDED_FOR: Final = b"x-forwarded-for"
 
 
 class TrustedProxies:
-    """ASGI middleware that puts the client's address and scheme in place of the proxy's.
+    """ASGI middleware that replaces the proxy's address and scheme by the client's.
 
     Parameters
     ----------
-    proxies : addresses and networks whose X-Forwarded-For and X-Forwarded-Proto are believed. Of a chain of
-        proxies the last address that is none of theirs is the client.
+    proxies : addresses and networks whose X-Forwarded-For and X-Forwarded-Proto are trusted. In a chain of
+        proxies, the last address that is not one of them is the client.
     """
 
     def __init__(self, app: ASGIApp, proxies: Sequence[str]) -> None:

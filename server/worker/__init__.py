@@ -1,1 +1,1 @@
-"""The worker: claims jobs, has a child process compute them, publishes what came out."""
+"""Worker: claims jobs, computes them in a child process and publishes the results."""

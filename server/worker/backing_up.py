@@ -1,6 +1,6 @@
-"""Backups beside the running server: a thread that looks at the clock, a process of its own that makes them.
+"""Scheduled backups next to the running server: a thread with a timer and a separate process for each backup.
 
-The process does nothing for the web and no job; its disk and processor are asked for last (nice).
+The process serves neither web requests nor jobs, and runs at low disk and CPU priority (nice).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ LOOK_S: Final = 20.0
 
 
 class BackupKeeper:
-    """The thread of `sagittal serve` that has backups made; does nothing where no folder is set."""
+    """Thread of `sagittal serve` that schedules backups; idle if no folder is configured."""
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
@@ -48,7 +48,7 @@ class BackupKeeper:
             self._thread.start()
 
     def stop(self) -> None:
-        """End; a backup that is being made is given up."""
+        """End the thread; a backup in progress is abandoned."""
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join(timeout=LOOK_S)
@@ -86,7 +86,7 @@ class BackupKeeper:
 
 
 def main() -> None:
-    """Make one backup, and test it when that is due."""
+    """Make one backup, and test it if due."""
     call_when_parent_ends(lambda: os._exit(1))
     settings = load_settings()
     start_log(settings)

@@ -1,4 +1,4 @@
-"""The computing process: warm, killable, limited in memory, without a connection to the database.
+"""Compute process: pre-warmed, killable, limited in memory and without access to the database.
 
 Started by server/worker/runner.py as `python -m sagittal.server.worker.child <socket> <parent pid>`.
 """
@@ -33,7 +33,7 @@ log = logging.getLogger("sagittal.server.worker.child")
 
 
 def main() -> None:
-    """Answer orders until the worker closes the socket."""
+    """Process orders until the worker closes the socket."""
     line, settings = enter_child()
     load(settings.task_modules)
     for task in TASKS.values():
@@ -49,7 +49,7 @@ def main() -> None:
 
 
 def compute(order: Order, store: BlobStore, line: Channel) -> Result | Failure:
-    """Carry out one order; whatever goes wrong is an answer, never the end of the process."""
+    """Carry out one order; any error becomes a response and never ends the process."""
     try:
         files = [_open(store, order.space, file) for file in order.files]
         left = None

@@ -1,6 +1,6 @@
-"""What worker and child say to each other: MessagePack over a socket pair.
+"""Messages between worker and child: MessagePack over a socket pair.
 
-Not pickle: the child reads files from outside, and who got hold of it must not get hold of the worker too.
+Not pickle: the child reads untrusted files, and a compromised child must not compromise the worker.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from sagittal.web.user_text import encode_user_text
+from sagittal.core.user_text import encode_user_text
 
 
 class Input(msgspec.Struct, frozen=True, tag=True):
@@ -32,11 +32,11 @@ class Order(msgspec.Struct, frozen=True, tag=True):
 
 
 class ChildReady(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: everything is imported and compiled."""
+    """Child to worker: all modules are imported and compiled."""
 
 
 class Stage(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: a stage starts, or goes on and has something to say."""
+    """Child to worker: a stage starts or reports progress."""
 
     name: str
     fraction: float
@@ -44,7 +44,7 @@ class Stage(msgspec.Struct, frozen=True, tag=True):
 
 
 class Checkpoint(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: another attempt could go on from here."""
+    """Child to worker: a checkpoint from which another attempt can resume."""
 
     content: bytes
 
@@ -56,7 +56,7 @@ class Result(msgspec.Struct, frozen=True, tag=True):
 
 
 class Failure(msgspec.Struct, frozen=True, tag=True):
-    """Child to worker: nothing came out, and why; `passing` = of no fault of the job, to be tried again."""
+    """Child to worker: no result, with the reason; `passing` = temporary, to be retried."""
 
     code: str
     message: str

@@ -1,4 +1,4 @@
-"""The worker's hold on its child: start it, give it an order, listen, kill it."""
+"""Control of the child process by the worker: start, send orders, receive, kill."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from sagittal.server.worker.messages import Order, Reply, decode_reply, encode
 
 
 class ChildDiedError(Exception):
-    """The child is gone without an answer."""
+    """The child ended without a response."""
 
 
 class Child:
-    """A running child process; it is warm once it has said Ready."""
+    """A running child process; it is warm after its first ChildReady."""
 
     def __init__(self, settings: Settings) -> None:
         self._process, line = start_child("sagittal.server.worker.child", settings, BEHIND)
@@ -25,21 +25,21 @@ class Child:
         return self._process.pid
 
     def send(self, order: Order) -> None:
-        """Give it work; raises ChildDiedError."""
+        """Send an order; raises ChildDiedError."""
         try:
             self._line.send(encode(order))
         except OSError:
             raise self._death() from None
 
     def receive(self, timeout_s: float) -> Reply | None:
-        """Return its next word, None if it says nothing in time; raises ChildDiedError."""
+        """Return the next message, None on timeout; raises ChildDiedError."""
         try:
             return decode_reply(self._line.receive()) if self._line.has_message(timeout_s) else None
         except (EOFError, OSError):
             raise self._death() from None
 
     def kill(self) -> None:
-        """End it now and wait until it is gone."""
+        """Kill the child and wait for it."""
         end_process(self._process)
         self._line.close()
 

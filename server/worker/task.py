@@ -1,4 +1,4 @@
-"""A kind of job: what the child computes, and how the worker publishes what came out."""
+"""Kinds of jobs: computation in the child, and publication of results by the worker."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def _nothing() -> None:
-    """Nothing to warm."""
+    """No-op for kinds without warm-up."""
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class Task:
     ----------
     run : in the child: (files, the job's params, attempt) → result files; raises SagittalError.
     publish : in the worker, inside the transaction that marks the job done: (connection, claim, result files,
-        the same as blobs). It may raise SagittalError: then the job fails and nothing is written.
+        their blobs). If it raises SagittalError, the job fails and nothing is written.
     keeps_files : whether the result files are stored as blobs before the transaction.
-    warm : imports and compiles what `run` needs, once per child.
+    warm : imports and compiles everything required by `run`, once per child.
     """
 
     kind: str
@@ -46,7 +46,7 @@ TASKS: dict[str, Task] = {}
 
 
 def register(task: Task) -> Task:
-    """Add a kind; the same kind twice is a mistake."""
+    """Register a kind; registering it twice is an error."""
     if TASKS.setdefault(task.kind, task) is not task:
         raise ValueError(f"Two tasks are named {task.kind}.")
     return task

@@ -1,8 +1,8 @@
-"""The kinds of job of this version.
+"""Built-in kinds of jobs.
 
-Look into a recording, analyse it, run filters on it, tune one, see how sure the angles of squats are, write
-a file for another program. The kinds that concern one room are its own `run` and `publish`; the two here
-join two rooms each.
+Inspect a recording, analyse it, run filters on it, tune a filter, estimate the uncertainty of squat angles,
+export a file for another program. Kinds that concern one package are that package's `run` and `publish`; the
+two defined here combine two packages each.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def _inspect(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: At
 def _publish_inspection(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    found = json.loads(files[FOUND])
-    recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], found)
+    inspection = json.loads(files[FOUND])
+    recordings.publish_inspection(c, str(claim.recording_id), claim.params["input_sha256"], inspection)
 
 
 def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt) -> dict[str, bytes]:
@@ -46,13 +46,13 @@ def _analyse(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: At
 def _publish_analysis(
     c: Connection, claim: Claim, files: Mapping[str, bytes], blobs: Mapping[str, Blob]
 ) -> None:
-    found = json.loads(files["analysis.json"])
-    analyses.publish(c, claim, blobs, found["provenance"]["parameters_sha256"])
-    devices.keep_checks(c, str(claim.recording_id), found["devices"])
+    summary = json.loads(files["analysis.json"])
+    analyses.publish(c, claim, blobs, summary["provenance"]["parameters_sha256"])
+    devices.keep_checks(c, str(claim.recording_id), summary["devices"])
 
 
 def _warm() -> None:
-    """Import readers and pipeline, compile the kernels or load them from the cache."""
+    """Import readers and pipeline, and compile the kernels or load them from the cache."""
     import sagittal.server.report.files.exports  # noqa: F401
     from sagittal.core.agreement.slips import compile_agreement_kernels
     from sagittal.core.body import estimate

@@ -1,7 +1,7 @@
-"""A worker: claims jobs, has its child compute them, keeps the lease alive, publishes.
+"""Worker: claims jobs, lets its child compute them, renews the lease and publishes the results.
 
-It runs in a process of its own (`sagittal serve` starts one, `sagittal worker` is one); run as a module it
-ends with its starter. Numbers are computed in the child only: that one may be killed at any moment.
+It runs in its own process (started by `sagittal serve` or as `sagittal worker`); run as a module it ends with
+its parent. Computations run only in the child, which may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Worker:
 
     Parameters
     ----------
-    stop : set it to end: the current job is given back unharmed.
+    stop : set to end; the current job is released.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Worker:
         self._child: Child | None = None
 
     def run(self) -> None:
-        """Work until stopped; an error of the database or the child costs a pause, never the worker."""
+        """Work until stopped; after an error of the database or the child it pauses and continues."""
         try:
             with self._queue.listen() as wait:
                 self._work(wait)
@@ -121,7 +121,7 @@ class Worker:
         return True
 
     def _warm_child(self) -> Child | None:
-        """The ready child, or None when we were stopped while it got ready."""
+        """The ready child, or None if stopped while it was starting."""
         if self._child is not None:
             self._child.receive(0.0)  # raises if it died while idle
             return self._child
@@ -135,7 +135,7 @@ class Worker:
         return None
 
     def _attend(self, claim: Claim, child: Child) -> None:
-        """See one attempt to its end, whichever it is."""
+        """Run one attempt to its end, whatever the outcome."""
         log.info("job %s (%s), claim %d", claim.job_id, claim.kind, claim.attempt)
         try:
             child.send(_order(claim))
@@ -167,9 +167,9 @@ class Worker:
                 self._persist(self._queue.release, claim)
 
     def _listen(self, claim: Claim, child: Child) -> Result | Failure | LeaseState:
-        """Keep the lease, pass on progress until the child is done or must end (OURS: we are stopped).
+        """Renew the lease and forward progress until the child is done or must end (OURS: stopping).
 
-        The time limit counts from the last checkpoint: whoever leaves one is not stuck.
+        The time limit counts from the last checkpoint, as a job that stores checkpoints is not stuck.
         """
         beat_s = self._settings.lease_s / 3
         began = time.monotonic()
@@ -214,14 +214,15 @@ class Worker:
         return LeaseState.OURS
 
     def _persist(self, ask: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Ask the queue; while another program holds the database or it is away, say so and try again.
+        """Call the queue; while the database is busy or unavailable, log and retry.
 
-        Meanwhile the child computes on. Was the job given to somebody else, the fence tells afterwards.
+        The child continues meanwhile. If the job was given to another worker, the fence detects it
+        afterwards.
 
         Raises
         ------
         SQLAlchemyError
-            another error, or we are stopped while we wait.
+            another error, or the worker is stopped while waiting.
         """
         began, pause_s = time.monotonic(), IDLE_S
         while True:
@@ -238,7 +239,7 @@ class Worker:
             pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
     def _keep(self, claim: Claim, content: bytes) -> None:
-        """Store a checkpoint, then remove the one before it; the job goes on without where that fails."""
+        """Store a checkpoint, then remove the previous one; failures are logged and the job continues."""
         space = str(claim.params["space"])
         try:
             blob = self._holding(claim, lambda: self._blobs.put(space, content))
@@ -256,7 +257,7 @@ class Worker:
             log.exception("job %s: a former checkpoint stays for the sweep", claim.job_id)
 
     def _publish(self, claim: Claim, files: Mapping[str, bytes]) -> None:
-        """Files first, then one transaction under the fence."""
+        """Store the files first, then commit one transaction under the fence."""
         task = TASKS[claim.kind]
         try:
             blobs = self._store(task, claim, files)
@@ -278,7 +279,7 @@ class Worker:
                 self._put_away(claim, blobs)
 
     def _wait_for_store(self, claim: Claim) -> None:
-        """Give a job back that could not read or store its files; it costs no attempt, and a pause."""
+        """Release a job whose files could not be read or stored, and pause; the attempt is not counted."""
         if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
             self._persist(self._queue.stop, claim)
         else:
@@ -286,7 +287,7 @@ class Worker:
         raise StoreAway(f"job {claim.job_id} waits", refuses=False)
 
     def _put_away(self, claim: Claim, blobs: Mapping[str, Blob]) -> None:
-        """Deal with a result that nobody wants any more."""
+        """Dispose of a result that is no longer wanted."""
         if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
             self._persist(self._queue.stop, claim)
         elif blobs and self._queue.get(claim.job_id) is None:
@@ -304,7 +305,7 @@ class Worker:
         )
 
     def _holding(self, claim: Claim, work: Callable[[], T]) -> T:
-        """Do what may take long, and keep the lease meanwhile."""
+        """Run a long operation while renewing the lease."""
         with ThreadPoolExecutor(1) as pool:
             doing = pool.submit(work)
             while not wait_for([doing], self._settings.lease_s / 3).done:
@@ -342,9 +343,9 @@ def _order(claim: Claim) -> Order:
 
 
 def run_worker(settings: Settings, *, with_starter: bool = False) -> None:
-    """Be a worker until SIGTERM or SIGINT, or until the starter is gone; the job at hand is given back.
+    """Run a worker until SIGTERM or SIGINT, or until the parent ends; the current job is released.
 
-    It waits for a server to prepare the database.
+    Waits until a server has prepared the database.
     """
     load(settings.task_modules)
     stop = threading.Event()

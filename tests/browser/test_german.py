@@ -7,7 +7,8 @@ from typing import Final
 import pytest
 from playwright.sync_api import Page
 
-from sagittal.web.language import PLACEHOLDER, load_catalogue
+from sagittal.core.message import PLACEHOLDER
+from sagittal.web.language import load_catalogue
 from tests.browser.conftest import Filled, Opener
 from tests.browser.design import layout_faults, text_faults
 from tests.browser.test_look import OUT, PAGES

@@ -1,12 +1,13 @@
-"""The tables of docs/reference/parameters.md, written from the catalogue: `python -m
-tests.helpers.parameter_page`.
+"""Generate the tables of docs/reference/parameters.md: `python -m tests.helpers.parameter_page`.
 
-Each stands between `<!-- catalogue: heading -->` and `<!-- end -->`; what is around them is written by hand.
+A table is placed between `<!-- catalogue: heading -->` and `<!-- end -->`; the text around it is written by
+hand.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -17,52 +18,67 @@ PAGE: Final = ROOT / "docs" / "reference" / "parameters.md"
 
 TABLE: Final = re.compile(r"(<!-- catalogue: (?P<group>[^>]+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
-STATISTICS: Final = {"at": "at contact", "max": "most", "min": "least", "range": "most − least"}
+NEEDS_HEADING: Final = "needs"
+"""Heading of the table that explains the keys of the column *needs*."""
+
+Row = tuple[str, ...]
+
+STATISTICS: Final = {"at": "at contact", "max": "maximum", "min": "minimum", "range": "maximum − minimum"}
 
 
 def render_page(text: str) -> str:
-    """The page with its tables as the catalogue has them.
+    """Page with its tables generated from the catalogue.
 
     Raises
     ------
     ValueError
-        A group of the catalogue has no table, or a table no group.
+        Tables and groups of the catalogue do not match one to one.
     """
-    groups = dict.fromkeys(entry.group for entry in CATALOGUE.values())
-    written = [found["group"] for found in TABLE.finditer(text)]
-    if sorted(written) != sorted(groups):
-        raise ValueError(f"tables of {written}, expected one each of {list(groups)}")
-    return TABLE.sub(lambda found: found[1] + "\n" + _table(found["group"]) + "\n", text)
+    headings = [NEEDS_HEADING, *dict.fromkeys(entry.group for entry in CATALOGUE.values())]
+    present = [match["group"] for match in TABLE.finditer(text)]
+    if sorted(present) != sorted(headings):
+        raise ValueError(f"tables of {present}, expected one each of {headings}")
+
+    def render(match: re.Match[str]) -> str:
+        table = _needs_table() if match["group"] == NEEDS_HEADING else _table(match["group"])
+        return f"{match[1]}\n{table}\n"
+
+    return TABLE.sub(render, text)
 
 
 def _table(group: str) -> str:
     rows = [_row(entry) for entry in CATALOGUE.values() if entry.group == group]
-    head = ("name", "label", "unit", "definition", "needs", "norm", "change", "± from")
+    return _format(("name", "label", "unit", "definition", "needs", "norm"), rows)
+
+
+def _needs_table() -> str:
+    return _format(("key", "needs"), [(f"`{key}`", text) for key, text in NEEDS.items()])
+
+
+def _format(head: Row, rows: Sequence[Row]) -> str:
     lines = [" | ".join(cells) for cells in (head, ("---",) * len(head), *rows)]
     return "".join(f"| {line} |\n" for line in lines).replace("| --- ", "|---").replace("|--- |", "|---|")
 
 
-def _row(entry: ParameterEntry) -> tuple[str, ...]:
+def _row(entry: ParameterEntry) -> Row:
     definition = entry.definition if entry.curve is None else f"{entry.definition} {_window(entry.curve)}"
     if entry.of == "take":
-        definition += " One of the take."
+        definition += " Per trial."
     norm: str = "" if entry.norm is None else entry.norm.table
     if entry.norm is not None and entry.norm.differs is not None:
         norm += f", not comparable ({entry.norm.differs.replace('_', '-')})"
-    needs = ", ".join(NEEDS[need] for need in entry.needs)
-    change = (entry.change or "").replace("_", " ")
-    known = "" if entry.errors is None else entry.errors.source
-    return f"`{entry.name}`", entry.label, entry.printed_unit, definition, needs, norm, change, known
+    needs = " ".join(f"`{need}`" for need in entry.needs)
+    return f"`{entry.name}`", entry.label, entry.printed_unit, definition, needs, norm
 
 
 def _window(curve: CurveFigure) -> str:
-    part = STATISTICS[curve.statistic]
+    statistic = STATISTICS[curve.statistic]
     whole = (curve.start_pct, curve.end_pct) == (0, 100)
-    return f"({part})" if whole else f"({part} in {curve.start_pct}–{curve.end_pct} %)"
+    return f"({statistic})" if whole else f"({statistic} in {curve.start_pct}–{curve.end_pct} %)"
 
 
 def write_page(path: Path = PAGE) -> None:
-    """Write the tables into the page."""
+    """Write the tables to the page."""
     path.write_text(render_page(path.read_text("utf-8")), "utf-8")
 
 

@@ -15,13 +15,15 @@ from babel.messages.catalog import Catalog
 from babel.messages.pofile import read_po, write_po
 
 from sagittal.server.report.view.level import ANATOMICAL, STANDING
-from sagittal.web.language import CITED, LANGUAGES, SOURCE, catalogue_path
-from sagittal.web.template_texts import has_words, list_texts, reads_like_text
+from sagittal.web.language import LANGUAGES, SOURCE, catalogue_path
+from sagittal.web.message_format import has_words
+from sagittal.web.stored_sentences import CITED
+from sagittal.web.template_texts import list_texts, reads_like_text
 from tests.data import ROOT
 
 SAID: Final = re.compile(
     r"^(Notice|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
-    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable)$"
+    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable|Message)$"
 )
 """Classes, and what makes them, whose arguments pages show, wherever they are made."""
 
@@ -87,6 +89,7 @@ WORDS: Final = frozenset(
     re.findall(
         r"\S+",
         """
+    reduced increased shortened prolonged
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
     assistant away back bad bar barefoot bars baseline before below both bouts cane centimetres changed
     chest children clinician complementary consistent copies copy crutch days degrees directions down
@@ -266,7 +269,7 @@ def python_texts(source: str, *, whole: bool) -> Iterator[str]:
 def titles_of(tree: ast.AST) -> Iterator[str]:
     """What notices without a title of their own are called, by their codes."""
     for call in ast.walk(tree):
-        if isinstance(call, ast.Call) and SAID.match(_name(call.func)):
+        if isinstance(call, ast.Call) and SAID.match(_name(call.func)) and _name(call.func) != "Message":
             codes = (a.value for a in call.args if isinstance(a, ast.Constant) and isinstance(a.value, str))
             code = next(codes, "")
             if re.fullmatch(r"[a-z][a-z_]{2,}", code):

@@ -41,7 +41,7 @@ def walked(
     calibrated = calibration.calibrate(timeline.synchronise(take.recording))
     orientations = estimate_orientations(calibrated)
     whole = slice(0, len(orientations.t_s))
-    motions = {foot: x.cut(whole) for foot, x in measure_foot_movements(calibrated).items()}  # type: ignore[attr-defined]
+    motions = {foot: x.cut(whole) for foot, x in measure_foot_movements(calibrated).items()}
     return orientations, motions, take.truth
 
 

@@ -18,8 +18,9 @@ DATED = (
     "core/activity/result.py",
     "core/activity/totals.py",
     "core/formats/vendors/cwa.py",
+    "core/message.py",
 )
-"""They handle dates read from a device's file; none reads the clock."""
+"""They handle dates read from a device's file or given to a message; none reads the clock."""
 COMPILER = "core/body/erkf/vector_lanes.py"
 """It extends Numba's compiler, llvmlite, by a vector type."""
 EFFECTS = {

@@ -1,1 +1,1 @@
-"""The leg as a chain of hinges on a foot that stands still (docs/science/squat.md)."""
+"""The leg as a chain of hinge joints on a stationary foot (docs/science/squat.md)."""

@@ -1,4 +1,4 @@
-"""The legs that were followed as one body: whose pelvis it is, and the figure."""
+"""Combination of the two leg chains: common pelvis and stick figure."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ HAND_OVER_S: Final = 0.5
 
 
 def join_legs(legs: Mapping[Side, LegMotion]) -> Orientations:
-    """Segments of all legs, with the pelvis of the leg that stands, of two the mean.
+    """Segments of all legs, with the pelvis from the supporting leg, or the mean in double support.
 
-    Each leg's chain has a pelvis of its own; they differ by what the chains drifted about the vertical.
+    Each leg's chain estimates the pelvis separately; the estimates differ by the drift about the vertical.
     """
     chains = [legs[side].orientations for side in SIDES if side in legs]
     if len(chains) == 1:
@@ -55,7 +55,8 @@ def _share_pelvis(legs: list[LegMotion], rate_hz: float) -> tuple[Floats, Bools]
 
 
 def draw_legs(legs: Mapping[Side, LegMotion], height_m: float | None) -> PoseEstimate:
-    """The figure on the feet that stand; a lifted foot, which nothing measures, hangs square on its shin.
+    """Poses with the supporting feet on the floor; a lifted foot, which is not measured, is drawn at a right
+    angle to the shank.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
-"""Joint angles of a chain from its sensors, sample by sample or a whole take at once.
+"""Joint angles of a chain from its sensors, sample by sample or for a whole recording.
 
-A filter that is given the samples in blocks of any size gives the same bits as one that is given all.
+Results are bit-identical for any division of the samples into blocks.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from sagittal.core.body.chain.kernel import (
 from sagittal.core.body.chain.model import RevoluteChain
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 START_STEPS: Final = 15
 """Steps of Gauss and Newton to the start; six are enough from 40°."""
@@ -31,12 +32,12 @@ START_STEPS: Final = 15
 
 @dataclass(frozen=True)
 class ChainFilterParams:
-    """What is expected of sensors and movement (docs/science/squat.md, "Parameters").
+    """Noise model of sensors and movement (docs/science/squat.md, "Parameters").
 
     Parameters
     ----------
-    gyr_noise, acc_noise : rad/s, m/s², of a sample, errors of the model included.
-    jerk : rad/s³/√Hz of a joint. yaw : rad, of the virtual sensor that holds the hip's rotation at zero.
+    gyr_noise, acc_noise : rad/s, m/s², per sample, including model errors.
+    jerk : rad/s³/√Hz of a joint. yaw : rad, of the virtual sensor that constrains hip rotation to zero.
 
     Raises
     ------
@@ -52,7 +53,8 @@ class ChainFilterParams:
         for name, value in vars(self).items():
             if not (isfinite(value) and value > 0.0):
                 raise ParameterError(
-                    "parameter_out_of_range", f"{name} = {value:g}; expected a number above 0."
+                    "parameter_out_of_range",
+                    Message("{name} = {value:g}; expected a number above 0.", name=name, value=value),
                 )
 
 
@@ -66,12 +68,12 @@ class ChainMotion:
 
 
 class ChainFilter:
-    """One extended Kalman filter per sensor, each on the estimate of those below it.
+    """One extended Kalman filter per sensor, each based on the estimates of those below it.
 
     Parameters
     ----------
-    rest_force : (S, 3) mean specific force of the sensors while the chain stood still, m/s². The filter
-        starts in the pose that gravity shows, with all angles about the vertical zero.
+    rest_force : (S, 3) mean specific force of the sensors in quiet standing, m/s². The filter starts in the
+        pose determined by gravity, with all angles about the vertical zero.
 
     Raises
     ------
@@ -92,11 +94,21 @@ class ChainFilter:
     ) -> None:
         params = params or ChainFilterParams()
         if not 10.0 <= rate_hz <= 5000.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be 10 to 5000 Hz, not {rate_hz:g}.")
+            raise ParameterError(
+                "rate_out_of_range",
+                Message("The rate must be 10 to 5000 Hz, not {rate_hz:g}.", rate_hz=rate_hz),
+            )
         sensors = len(chain.places)
         force = np.asarray(rest_force, np.float64)
         if force.shape != (sensors, 3) or not np.isfinite(force).all():
-            raise ParameterError("bad_shape", f"Expected a rest force of ({sensors}, 3), got {force.shape}.")
+            raise ParameterError(
+                "bad_shape",
+                Message(
+                    "Expected a rest force of ({sensors}, 3), got {shape}.",
+                    sensors=sensors,
+                    shape=force.shape,
+                ),
+            )
         self._arrays = ChainArrays(
             axes=np.ascontiguousarray(chain.axes, np.float64),
             offsets=np.ascontiguousarray(chain.offsets, np.float64),
@@ -116,12 +128,12 @@ class ChainFilter:
         _stand(self._arrays, chain.start_sd, force, self._noise.acc, self._x, self._P)
 
     def advance(self, gyr: Floats, acc: Floats, valid: Bools | None = None) -> ChainMotion:
-        """Run over the next samples.
+        """Process the next samples.
 
         Parameters
         ----------
-        gyr, acc : (n, S, 3) rad/s, bias taken off, and m/s². valid : (n, S), None = all. While a sensor is
-            silent the joints of its group are held, and their `sd` grows.
+        gyr, acc : (n, S, 3) bias-corrected rad/s, and m/s². valid : (n, S), None = all. During data loss of a
+            sensor the joints of its group are held constant while their `sd` grows.
 
         Raises
         ------
@@ -133,7 +145,13 @@ class ChainFilter:
         if gyr.shape != shape or acc.shape != shape or known.shape != shape[:2]:
             raise EstimationError(
                 "bad_shape",
-                f"Expected gyr and acc of {shape}, got {gyr.shape} and {acc.shape}, valid {known.shape}.",
+                Message(
+                    "Expected gyr and acc of {shape}, got {shape2} and {shape3}, valid {shape4}.",
+                    shape=shape,
+                    shape2=gyr.shape,
+                    shape3=acc.shape,
+                    shape4=known.shape,
+                ),
             )
         if not (np.isfinite(gyr[known]).all() and np.isfinite(acc[known]).all()):
             raise EstimationError("filter_diverged", "A sample is no number; mark it as not valid.")
@@ -151,7 +169,7 @@ class ChainFilter:
 def _stand(
     chain: ChainArrays, start_sd: Floats, force: Floats, acc_noise: float, x: Floats, P: Floats
 ) -> None:
-    """Write the pose in which a chain at rest reads `force`, x (J, 3), and its covariance P (S, n, n)."""
+    """Write the pose in which a chain at rest measures `force`, x (J, 3), and its covariance P (S, n, n)."""
     s = make_scratch(P.shape[1])
     below = np.zeros((6, 3))
     below[:3] = chain.base

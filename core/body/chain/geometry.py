@@ -1,4 +1,4 @@
-"""Lengths of one leg and places of its three sensors, by the measures of Kianifar et al."""
+"""Lengths of one leg and positions of its three sensors, by the measures of Kianifar et al."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sagittal.core.body.model import LEG_FRACTION, NOMINAL_HEIGHT_M, SHANK_FRACT
 from sagittal.core.calibration.fixed_offset import SHIN_FACE
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats, Side
+from sagittal.core.message import Message
 
 PELVIS_WIDTH_FRACTION: Final = 0.137
 """Between the anterior superior iliac spines as a fraction of body height: own estimate, 24 cm at 1.75 m.
@@ -21,11 +22,11 @@ LONGEST_M: Final = 2.0
 
 
 def locate_hip(pelvis_width: float, pelvis_depth: float, leg_length: float) -> Floats:
-    """Centre (3,) of a hip from the middle between the anterior iliac spines: forward, up, outward, m.
+    """Hip joint centre (3,) relative to the midpoint of the anterior iliac spines: forward, up, outward, m.
 
     References
     ----------
-    Harrington et al. 2007, table 4, equations of several predictors, written there in mm;
+    Harrington et al. 2007, table 4, equations with several predictors, given there in mm;
     doi:10.1016/j.jbiomech.2006.02.003.
     """
     return np.array(
@@ -39,17 +40,17 @@ def locate_hip(pelvis_width: float, pelvis_depth: float, leg_length: float) -> F
 
 @dataclass(frozen=True)
 class LegGeometry:
-    """The fifteen lengths that the chain takes from a body, m (Kianifar, figures 2 and 3, table 1).
+    """The fifteen body dimensions used by the chain, m (Kianifar, figures 2 and 3, table 1).
 
     Parameters
     ----------
     tibia, thigh : ankle to knee centre, knee to hip centre.
-    tibia_to_knee, thigh_to_knee : middle of the sensor to the knee centre, along the bone.
-    tibia_circumference, thigh_circumference : where the sensors sit; their radius is the way outward.
-    tibia_aside, thigh_aside : sensor beside that line, inward. knee_forward, knee_inward, hip_forward,
-    hip_inward : next joint centre beside the long axis.
-    pelvis_width, pelvis_depth, leg_length : of Harrington's hip centre.
-    estimated : taken from body height, not measured.
+    tibia_to_knee, thigh_to_knee : sensor centre to the knee centre, along the bone.
+    tibia_circumference, thigh_circumference : at the sensors; the radius is the outward offset.
+    tibia_aside, thigh_aside : offset of the sensor from that line, inward. knee_forward, knee_inward,
+        hip_forward, hip_inward : offset of the next joint centre from the long axis.
+    pelvis_width, pelvis_depth, leg_length : for Harrington's hip joint centre.
+    estimated : derived from body height, not measured.
 
     Raises
     ------
@@ -83,14 +84,20 @@ class LegGeometry:
             if not (isfinite(length) and least < length < LONGEST_M):
                 raise ParameterError(
                     "length_implausible",
-                    f"{field.name} is {length:g} m; expected {least:g} to {LONGEST_M:g} m, in metres.",
+                    Message(
+                        "{name} is {length:g} m; expected {least:g} to {LONGEST_M:g} m, in metres.",
+                        name=field.name,
+                        length=length,
+                        least=least,
+                        LONGEST_M=LONGEST_M,
+                    ),
                 )
 
     @classmethod
     def from_height(cls, height_m: float | None, side: Side) -> LegGeometry:
-        """Lengths by fractions of body height in m, nominal height where nobody gave one; marked estimated.
+        """Lengths as fractions of body height in m, nominal height if not given; marked as estimated.
 
-        The other measures are the same for everybody (docs/science/squat.md, "Measures of the body").
+        The other dimensions are constants (docs/science/squat.md, "Measures of the body").
         """
         height = NOMINAL_HEIGHT_M if height_m is None else height_m
         return cls(
@@ -104,31 +111,33 @@ class LegGeometry:
 
     @property
     def outward(self) -> float:
-        """Sign of the segments' z axis, to the right, on the way outward."""
+        """Sign of the segments' z axis, which points to the right, in the outward direction."""
         return 1.0 if self.side == "right" else -1.0
 
     def knee_from_ankle(self) -> Floats:
-        """(3,) in shank axes."""
+        """Vector (3,) in shank axes."""
         return np.array([self.knee_forward, self.tibia, -self.outward * self.knee_inward])
 
     def hip_from_knee(self) -> Floats:
-        """(3,) in thigh axes."""
+        """Vector (3,) in thigh axes."""
         return np.array([self.hip_forward, self.thigh, -self.outward * self.hip_inward])
 
     def tibia_sensor_from_ankle(self) -> Floats:
-        """(3,) in shank axes: on the flat side of the shin (table 1, with the sign of joint to sensor)."""
+        """Vector (3,) in shank axes: on the flat side of the shin (table 1, with the sign of joint to
+        sensor).
+        """
         radius, aside = self.tibia_circumference / (2.0 * pi), self.tibia_aside
         forward = radius * cos(SHIN_FACE) - aside * sin(SHIN_FACE)
         inward = radius * sin(SHIN_FACE) + aside * cos(SHIN_FACE)
         return np.array([forward, self.tibia - self.tibia_to_knee, -self.outward * inward])
 
     def thigh_sensor_from_knee(self) -> Floats:
-        """(3,) in thigh axes: on the front of the thigh."""
+        """Vector (3,) in thigh axes: on the front of the thigh."""
         radius = self.thigh_circumference / (2.0 * pi)
         return np.array([radius, self.thigh_to_knee, -self.outward * self.thigh_aside])
 
     def back_sensor_from_hip(self) -> Floats:
-        """(3,) in pelvis axes: between the posterior iliac spines, −(V1 + V2) of figure 2."""
+        """Vector (3,) in pelvis axes: between the posterior iliac spines, −(V1 + V2) of figure 2."""
         hip = locate_hip(self.pelvis_width, self.pelvis_depth, self.leg_length)
         return -np.array([self.pelvis_depth + hip[0], hip[1], self.outward * hip[2]])
 

@@ -2,7 +2,7 @@
 
 Equations: docs/science/squat.md, with the same symbols. A motion (6, 3) is that of a link: rows 0 to 2 its
 orientation R in the world, 3 its rate ω, 4 its angular acceleration α, 5 the acceleration a of its joint.
-Derivatives (n, 4, 3) are those of the turn, ω, α and a by the n states of the group of joints.
+Derivatives (n, 4, 3) are those of rotation, ω, α and a with respect to the n states of the group of joints.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ START_ACCELERATION = 1.0
 
 
 class ChainArrays(NamedTuple):
-    """`RevoluteChain` as the loops take it; first (S + 1,), bounded (J,)."""
+    """`RevoluteChain` in the form used by the loops; first (S + 1,), bounded (J,)."""
 
     axes: Floats
     offsets: Floats
@@ -38,7 +38,7 @@ class ChainArrays(NamedTuple):
 
 
 class ChainNoise(NamedTuple):
-    """Standard deviations: gyr rad/s, acc m/s² and yaw rad of a sample; jerk rad/s³/√Hz; step s."""
+    """Standard deviations: gyr rad/s, acc m/s² and yaw rad per sample; jerk rad/s³/√Hz; step s."""
 
     gyr: float
     acc: float
@@ -48,8 +48,9 @@ class ChainNoise(NamedTuple):
 
 
 class ChainScratch(NamedTuple):
-    """Room for one sample: motion (2, 6, 3) · d (n, 4, 3) · H (6, n) · h (6,) · v (9, 3) · M (3, 3, 3) ·
-    K (n,) · dx (n,)."""
+    """Work arrays for one sample: motion (2, 6, 3) · d (n, 4, 3) · H (6, n) · h (6,) · v (9, 3) · M (3, 3,
+    3) · K (n,) · dx (n,).
+    """
 
     motion: Floats
     d: Floats
@@ -63,7 +64,7 @@ class ChainScratch(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def make_scratch(n):  # type: ignore[no-untyped-def]
-    """Room for groups of up to n states."""
+    """Allocate work arrays for groups of up to n states."""
     return ChainScratch(
         np.zeros((2, 6, 3)), np.zeros((n, 4, 3)), np.zeros((6, n)), np.zeros(6), np.zeros((9, 3)),
         np.zeros((3, 3, 3)), np.zeros(n), np.zeros(n),
@@ -72,7 +73,7 @@ def make_scratch(n):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def accelerate(w, al, v, out, work):  # type: ignore[no-untyped-def]
-    """Add α × v + ω × (ω × v), the acceleration of a point at v on a turning link, to out (3,)."""
+    """Add α × v + ω × (ω × v), the acceleration of a point at v on a rotating link, to out (3,)."""
     cross(al, v, work[0])
     cross(w, v, work[1])
     cross(w, work[1], work[2])
@@ -82,7 +83,7 @@ def accelerate(w, al, v, out, work):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def differentiate_point(w, al, v, d, out, work):  # type: ignore[no-untyped-def]
-    """Add the derivative of `accelerate` by one state to out (3,); d (4, 3) of turn, ω, α and a."""
+    """Add the derivative of `accelerate` by one state to out (3,); d (4, 3) of rotation, ω, α and a."""
     cross(d[0], v, work[0])
     cross(d[1], v, work[1])
     cross(w, work[0], work[2])
@@ -99,11 +100,12 @@ def differentiate_point(w, al, v, d, out, work):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def pass_joint(motion, axis, offset, x, j, n, s):  # type: ignore[no-untyped-def]
-    """Go from the link below a joint to the one above it, in place; x (3,) angle, rate, acceleration.
+    """Propagate a motion from the link below a joint to the one above, in place; x (3,) angle, rate,
+    acceleration.
 
     Parameters
     ----------
-    j : place of the joint in its group. n : states whose derivatives are carried along, 0 for none.
+    j : index of the joint in its group. n : number of states with propagated derivatives, 0 for none.
     """
     R, w, al, a = motion[0:3], motion[3], motion[4], motion[5]
     v, z, u = s.v[6], s.v[7], s.v[8]
@@ -139,7 +141,7 @@ def pass_joint(motion, axis, offset, x, j, n, s):  # type: ignore[no-untyped-def
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def predict_signals(motion, place, mount, n, s):  # type: ignore[no-untyped-def]
-    """Write what a sensor reads, h (6,) rate and specific force, and its derivatives H (6, n)."""
+    """Write the predicted sensor signals h (6,), rate and specific force, and their derivatives H (6, n)."""
     R, w, al, a = motion[0:3], motion[3], motion[4], motion[5]
     v, force, u = s.v[6], s.v[7], s.v[8]
     transform(R, place, v)
@@ -203,7 +205,9 @@ def predict_states(x, P, noise):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def lose_states(x, P, step):  # type: ignore[no-untyped-def]
-    """A sample without its sensor: angles are held and become uncertain; x (m, 3), P (3 m, 3 m) in place."""
+    """Prediction without sensor data: angles are held with growing uncertainty; x (m, 3), P (3 m, 3 m) in
+    place.
+    """
     for j in range(x.shape[0]):
         x[j, 1] = x[j, 2] = 0.0
         for b in range(1, 3):
@@ -217,7 +221,7 @@ def lose_states(x, P, step):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always")  # type: ignore[misc, unused-ignore]
 def take_row(P, row, variance, innovation, s):  # type: ignore[no-untyped-def]
-    """Take one measured number, row (n,), into P (n, n) and the correction s.dx."""
+    """Scalar measurement update with row (n,): changes P (n, n) and the correction s.dx."""
     n = P.shape[0]
     total = variance
     for r in range(n):
@@ -238,7 +242,9 @@ def take_row(P, row, variance, innovation, s):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def correct_states(x, P, gyr, acc, bounded, noise, s):  # type: ignore[no-untyped-def]
-    """Correct a group by its sensor and by the virtual one; x (m, 3), P in place; False if P broke."""
+    """Update a group with its sensor and the virtual one; x (m, 3), P in place; False if P is not
+    positive.
+    """
     n = P.shape[0]
     s.dx[:n] = 0.0
     for r in range(3):
@@ -259,11 +265,12 @@ def correct_states(x, P, gyr, acc, bounded, noise, s):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def filter_chain(chain, noise, x, P, gyr, acc, valid, out):  # type: ignore[no-untyped-def]
-    """Filter a block of samples; memory x (J, 3) and P (S, n, n) in place; sample that broke, or −1.
+    """Filter a block of samples; state x (J, 3) and P (S, n, n) in place; returns the sample of failure, or
+    −1.
 
     Parameters
     ----------
-    gyr, acc : (T, S, 3) rad/s, m/s². valid : (T, S). out : (T, J, 3) angle, rate, and the angle's sd.
+    gyr, acc : (T, S, 3) rad/s, m/s². valid : (T, S). out : (T, J, 3) angle, rate, and sd of the angle.
     """
     s = make_scratch(P.shape[1])
     for k in range(gyr.shape[0]):

@@ -1,4 +1,4 @@
-"""From a calibrated take of squats to the orientations of the leg's segments."""
+"""Calibrated squat recording → orientations of the leg segments."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from sagittal.core.errors import EstimationError
 from sagittal.core.estimators import SQUAT_CHAIN
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import from_matrix
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window
@@ -27,13 +28,13 @@ UNCERTAIN: Final = radians(5.0)
 
 @dataclass(frozen=True, eq=False)
 class LegMotion:
-    """What the chain makes of a take.
+    """Result of the chain for one leg.
 
     Parameters
     ----------
-    side : leg that squats.
-    orientations : of shank, thigh, pelvis and of the foot, which stands neutral by definition.
-    chain : the model. motion : its joints from the sample `first` on.
+    side : the squatting leg.
+    orientations : of shank, thigh, pelvis and of the foot, which is in neutral orientation by definition.
+    chain : the model. motion : of its joints from the sample `first` on.
     stands : (n,) True where the foot is on the floor.
     """
 
@@ -47,14 +48,14 @@ class LegMotion:
 
 @dataclass(frozen=True, eq=False)
 class LegSignals:
-    """What the chain of a leg reads.
+    """Input signals of the chain of a leg.
 
     Parameters
     ----------
     mounts : segment → (3, 3) R_segment_sensor of shank, thigh and pelvis.
-    gyr, acc : (n, 3, 3) rad/s, m/s² of the three, biases taken off, from the standing on. valid : (n, 3).
-    rest_force : (3, 3) m/s² mean over the standing. first : sample of the recording at which they begin.
-    standing : samples of the standing, counted from `first`.
+    gyr, acc : (n, 3, 3) rad/s, m/s² of the three, bias-corrected, from standing on. valid : (n, 3).
+    rest_force : (3, 3) m/s² mean over standing. first : sample of the recording at which they begin.
+        standing : samples of standing, relative to `first`.
     """
 
     mounts: Mapping[Segment, Floats]
@@ -67,7 +68,7 @@ class LegSignals:
 
 
 def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
-    """Signals of a leg's sensors as its chain takes them.
+    """Sensor signals of a leg in the form used by its chain.
 
     Raises
     ------
@@ -83,9 +84,11 @@ def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
     if not known.any(axis=0).all():
         silent = segments[int(np.argmin(known.any(axis=0)))]
         raise EstimationError(
-            "no_standing", f"{silent} has no signal while standing; stand still before squatting.",
-            sensor=silent, t_s=calibration.zero[0],
-        )  # fmt: skip
+            "no_standing",
+            Message("{silent} has no signal while standing; stand still before squatting.", silent=silent),
+            sensor=silent,
+            t_s=calibration.zero[0],
+        )
     first = standing.start
     return LegSignals(
         mounts=mounts,
@@ -104,20 +107,21 @@ def estimate_leg(
     params: ChainFilterParams | None = None,
     stands: Bools | None = None,
 ) -> LegMotion:
-    """Orientations of a leg on its foot from the calibration's standing to the end of the take.
+    """Estimate the orientations of a leg above its foot, from the calibration's standing to the end of the
+    recording.
 
-    While the foot is lifted the shank is still followed by gyroscope and gravity, the foot by nothing: with
-    the feet's own movement up to 1.5° of knee and hip (docs/science/squat.md, "Two legs").
+    While the foot is lifted the shank is still tracked by gyroscope and gravity, but the foot is not: its own
+    movement causes errors of up to 1.5° at knee and hip (docs/science/squat.md, "Two legs").
 
     Parameters
     ----------
-    calibrated : sensors on shank, thigh and pelvis; others are not read.
-    stands : (n,) False where the foot is lifted; None = it never is.
+    calibrated : sensors on shank, thigh and pelvis; others are ignored.
+    stands : (n,) False where the foot is lifted; None = never lifted.
 
     Returns
     -------
-    LegMotion; not valid are samples before the standing, a segment while an angle below it is more
-    uncertain than 5°, and a lifted foot.
+    LegMotion; samples before standing are invalid, as are segments above an angle with an uncertainty of more
+    than 5°, and a lifted foot.
 
     Raises
     ------
@@ -141,7 +145,7 @@ def estimate_leg(
 def _write_segments(
     chain: RevoluteChain, motion: ChainMotion, valid: Bools, first: int, geometry: LegGeometry
 ) -> tuple[dict[Segment, Floats], dict[Segment, Bools]]:
-    """Orientations (n, 4) and where they are known (n,), from the foot up."""
+    """Orientations (n, 4) and their validity (n,), from the foot up."""
     n = len(valid)
     foot = FOOT[geometry.side]
     stood = np.zeros(n, bool)

@@ -1,7 +1,7 @@
-"""A chain of hinges with sensors on its links, and the leg as one.
+"""Chain of hinge joints with sensors on its links, and the leg as such a chain.
 
-Where Kianifar et al. use Denavit-Hartenberg frames a joint here is an axis and the way to it from the joint
-before: the poses are the same (docs/science/squat.md, "Chain").
+Where Kianifar et al. use Denavit-Hartenberg frames, a joint here is an axis and its offset from the previous
+joint: the poses are the same (docs/science/squat.md, "Chain").
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from sagittal.core.body.chain.geometry import LegGeometry
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import R_NEUTRAL, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 
 FORWARD: Final = (1.0, 0.0, 0.0)
 UP: Final = (0.0, 1.0, 0.0)
@@ -36,16 +37,17 @@ TILTS: Final = 2.0
 
 @dataclass(frozen=True, eq=False)
 class RevoluteChain:
-    """Hinges one after the other on a base that does not move, and one sensor on the last link of each group.
+    """Serial hinge joints on a fixed base, with one sensor on the last link of each group.
 
     Parameters
     ----------
-    axes : (J, 3) unit, and offsets : (J, 3) m from the joint before, both in the link below the joint.
+    axes : (J, 3) unit, and offsets : (J, 3) m from the previous joint, both in the axes of the link below the
+        joint.
     first : (S + 1,) first joint of each sensor's group, ending with J.
     places : (S, 3) m of the sensors from the last joint of their group. mounts : (S, 3, 3) sensor to link.
     base : (3, 3) link of the base to world.
-    bounded : (J,) True for angles that a virtual sensor holds about zero.
-    start_sd : (J,) rad, of the angles before anything was measured.
+    bounded : (J,) True for angles constrained to about zero by a virtual sensor.
+    start_sd : (J,) rad, initial uncertainty of the angles.
 
     Raises
     ------
@@ -73,7 +75,13 @@ class RevoluteChain:
         ):
             if array.shape != shape or not np.isfinite(array).all():
                 raise ParameterError(
-                    "bad_shape", f"RevoluteChain: {name} has shape {array.shape}, expected {shape}, finite."
+                    "bad_shape",
+                    Message(
+                        "RevoluteChain: {name} has shape {shape}, expected {shape2}, finite.",
+                        name=name,
+                        shape=array.shape,
+                        shape2=shape,
+                    ),
                 )
         groups = np.diff(self.first)
         if (
@@ -84,13 +92,18 @@ class RevoluteChain:
             or len(self.bounded) != joints
         ):
             raise ParameterError(
-                "bad_joint", f"RevoluteChain: {joints} joints are not split by {self.first}."
+                "bad_joint",
+                Message(
+                    "RevoluteChain: {joints} joints are not split by {first}.",
+                    joints=joints,
+                    first=self.first,
+                ),
             )
         if not np.allclose(np.linalg.norm(self.axes, axis=1), 1.0):
             raise ParameterError("bad_joint", "RevoluteChain: an axis is not of length 1.")
 
     def links(self, angles: Floats) -> list[Floats]:
-        """Orientations (n, 3, 3) in the world of the links that carry sensors, from angles (n, J)."""
+        """World orientations (n, 3, 3) of the links that carry sensors, from angles (n, J)."""
         from sagittal.core.rotation import exp, to_matrix
 
         found, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
@@ -107,7 +120,7 @@ def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
 
 
 def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segment, Segment]:
-    """`leg_segments`, all of which must be there.
+    """`leg_segments`, checked to be all available.
 
     Raises
     ------
@@ -118,14 +131,18 @@ def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segmen
     if missing:
         raise EstimationError(
             "segments_missing",
-            f"The squat needs sensors on {', '.join(worn)}; missing: {', '.join(missing)}.",
+            Message(
+                "The squat needs sensors on {worn}; missing: {missing}.",
+                worn=", ".join(worn),
+                missing=", ".join(missing),
+            ),
             sensor=missing[0],
         )
     return worn
 
 
 def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> RevoluteChain:
-    """The leg on its foot, which stands neutral: seven hinges, three sensors.
+    """The leg above its neutral foot: seven hinges, three sensors.
 
     Parameters
     ----------

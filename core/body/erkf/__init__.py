@@ -1,1 +1,1 @@
-"""Error-state Kalman filter of a chain of IMUs (Potter 2021), and its smoother."""
+"""Error-state Kalman filter of a chain of IMUs (Potter 2021), with smoother."""

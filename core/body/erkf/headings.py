@@ -1,10 +1,10 @@
-"""How the sensors sit about the vertical, as the chain of joints sees it.
+"""Correction of sensor headings by the constraints of the joints.
 
-Calibration finds each segment's forward axis on its own, from the direction of walking. Joint centres tell
-the ErKF the sensors' headings relative to each other, so a segment whose heading they change has a wrong
-forward axis. Its mounting is turned by the mean change while walking
-(docs/science/calibration.md, "Forward axes by the joints"). Which way is ahead no joint can tell: it is the
-median of the segments, so that no single calibration decides for all.
+Calibration estimates each segment's forward axis independently, from the direction of walking. Joint centres
+determine the relative headings of the sensors in the ErKF, so a segment whose heading they change has a wrong
+forward axis. Its alignment is corrected by the mean change while walking (docs/science/calibration.md,
+"Forward axes by the joints"). The common forward direction is not observable from the joints; it is the
+median of the segments, so that no single calibration determines it.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from sagittal.core.body.tree import person_tree
 from sagittal.core.errors import Notice, Severity
 from sagittal.core.frames import Segment
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, from_matrix, multiply, to_matrix, wrap_angle, yaw
 from sagittal.core.signals.calibrated import CalibratedRecording
 from sagittal.core.signals.rest import index_window
@@ -59,10 +60,10 @@ def align_forward_axes(
     segments: Sequence[Segment],
     params: ErkfParams,
 ) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
-    """Turn forward axes until they agree with the joints; what each was off by in all, rad.
+    """Rotate forward axes until they agree with the joints; returns the total correction of each, rad.
 
-    Where the last pass still turns one by more than any mounting is off, the joints are of other segments:
-    calibration's own axes stay.
+    If the last iteration still rotates one by more than any plausible alignment error, the joints belong to
+    other segments: the axes of the calibration are kept.
 
     Raises
     ------
@@ -83,7 +84,7 @@ def align_forward_axes(
 
 
 def judge_turned_axes(total: Mapping[Segment, float]) -> tuple[HealthFinding, ...]:
-    """What `align_forward_axes` had to turn, as health of the run."""
+    """Corrections of `align_forward_axes` as health findings of the run."""
     return tuple(
         HealthFinding("forward_axis_turned_deg", s, degrees(abs(x)), warn=degrees(WARN), bad=degrees(BAD))
         for s, x in total.items()
@@ -91,15 +92,18 @@ def judge_turned_axes(total: Mapping[Segment, float]) -> tuple[HealthFinding, ..
 
 
 def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
-    """What the reader must know of what `align_forward_axes` had to turn: `heading_corrected`."""
+    """Notice `heading_corrected` on the corrections of `align_forward_axes`."""
     off = [s for s in total if abs(total[s]) > TELL]
     if not off:
         return ()
     worst = max(off, key=lambda s: abs(total[s]))
-    message = (
-        f"The joints show that calibration took the wrong way for forward at {', '.join(off)}, by up to "
-        f"{degrees(abs(total[worst])):.0f}° ({worst}); it was turned. Frontal and transverse angles there "
-        "are less certain."
+    message = Message(
+        "The joints show that calibration took the wrong way for forward at {off}, by up to "
+        "{degrees:.0f}° ({worst}); it was turned. Frontal and transverse angles there are "
+        "less certain.",
+        off=", ".join(off),
+        degrees=degrees(abs(total[worst])),
+        worst=worst,
     )
     severity: Severity = "warning" if abs(total[worst]) > WARN else "info"
     return (Notice("heading_corrected", message, sensor=worst, severity=severity),)
@@ -112,14 +116,14 @@ def heading_errors(
     segments: Sequence[Segment],
     params: ErkfParams,
 ) -> dict[Segment, float]:
-    """How far each segment's forward axis is off the median of all, rad, left positive.
+    """Deviation of each segment's forward axis from the median of all, rad, left positive.
 
-    Nine states and the smoother, two minutes from the standing zero on, or the last two; empty when nobody
-    walks in them.
+    Nine states with smoother, over two minutes from the standing zero on, or the last two; empty if they
+    contain no walking.
 
     Raises
     ------
-    EstimationError of `person_tree` and `smooth`.
+    EstimationError as `person_tree` and `smooth`.
     """
     rate = calibrated.recording.rate_hz
     zero = index_window(calibrated.calibration.zero, rate)
@@ -151,7 +155,7 @@ def heading_errors(
 def turn_forward_axes(
     calibrated: CalibratedRecording, orientations: Orientations, errors: Mapping[Segment, float]
 ) -> tuple[CalibratedRecording, Orientations]:
-    """The calibration with its forward axes turned by `heading_errors`, the orientations to match."""
+    """The calibration with its forward axes rotated by `heading_errors`, and the orientations to match."""
     mounted, q = dict(calibrated.calibration.segments), dict(orientations.q)
     for segment, error in errors.items():
         was = mounted[segment]

@@ -1,4 +1,4 @@
-"""What an ErKF run says about itself (docs/reference/estimators.md, "Health")."""
+"""Health of an ErKF run (docs/reference/estimators.md, "Health")."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sagittal.core.body.erkf.poses import ErkfRun
 from sagittal.core.body.erkf.start import find_parts
 from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_run_s
 from sagittal.core.errors import Notice, Severity
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, multiply, wrap_angle, yaw
 from sagittal.core.signals.held_samples import cut_blocks
 
@@ -40,7 +41,7 @@ beyond up to 16° stay for a take (simulation, one sensor the wrong way round)."
 
 
 def erkf_health(run: ErkfRun) -> tuple[HealthFinding, ...]:
-    """Judge a run by its own quantities: joints, zero velocities, losses, height, covariance."""
+    """Judge a run by its own diagnostics: joints, zero velocities, data loss, height, covariance."""
     rate = 1.0 / float(np.median(run.inputs.step_s[run.inputs.step_s > 0.0]))
     valid, found = run.inputs.valid, []
     moving = ~run.inputs.still.all(axis=1)
@@ -129,12 +130,12 @@ STARTED_MOVING: Final = (
 
 
 def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Notice, ...]:
-    """What of it a person must be told."""
+    """Notices for the user on the health of the run."""
     told = []
     for f in findings:
         if f.verdict != "good" and f.name in TOLD:
             code, severity, words = TOLD[f.name]
-            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            message = Message(words, of=f.of, value=f.value, warn=f.warn)
             told.append(Notice(code, message, sensor=(f.of or "").split("-")[-1] or None, severity=severity))
     if run.rest is None:
         told.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))
@@ -142,7 +143,9 @@ def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Not
 
 
 def _start_heading(run: ErkfRun) -> HealthFinding:
-    """How far the smoother turned the first heading of a sensor against its part's median, the largest."""
+    """Largest correction of a sensor's initial heading by the smoother, relative to the median of its
+    part.
+    """
     turn = yaw(multiply(np.stack([q[0] for q in run.track.turns]), conjugate(run.start.nominal[:, 6:10])))
     part = find_parts(run.tree)
     off = np.zeros(len(turn))
@@ -155,7 +158,9 @@ def _start_heading(run: ErkfRun) -> HealthFinding:
 
 
 def _climb_pct(run: ErkfRun, foot: int) -> float:
-    """How far the foot's last rest lies above or below its first, of the way between, %."""
+    """Height difference between the first and the last rest of a foot, relative to the distance travelled,
+    %.
+    """
     rests = run.inputs.contact[:, foot]
     place, turned = run.track.places[foot], run.track.turns[foot]
     path = np.concatenate(

@@ -1,8 +1,8 @@
-"""The compiled loops of the ErKF: forward over a block of samples, and back over it for the smoother.
+"""The compiled loops of the ErKF: forward over a block of samples, and backward over it for the smoother.
 
-A sample is one `advance`: predict, add noise, judge contacts, correct, inject. It serves live blocks, whole
-recordings and the smoother's second pass, so all give the same bits. What the smoother needs is written to a
-`SmootherRecord`; without one the same slot is overwritten every sample.
+A sample is one `advance`: predict, add noise, judge contacts, correct, inject. It is shared by live blocks,
+whole recordings and the smoother's second pass, so all give bit-identical results. Data for the smoother are
+written to a `SmootherRecord`; without one the same slot is overwritten every sample.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ NONE_KEPT: Final[Floats] = np.empty((0, 0))
 
 
 class SmootherRecord(NamedTuple):
-    """What one segment of the forward pass leaves for the backward pass; K samples or 1.
+    """Record of the forward pass over one segment for the backward pass; K samples or 1.
 
     F (K, n, 5, 3, 3) · V (K, B, 3, as P) · E (K, B, 9) · H (K, B, 2, 3, 3) · place (K, B, 4) · blocks (K,) ·
-    Q (K, N) diagonal of what was added to the covariance before the blocks · dx (K, N) injected.
+    Q (K, N) diagonal added to the covariance before the blocks · dx (K, N) injected.
     """
 
     F: Floats
@@ -57,10 +57,11 @@ class SmootherRecord(NamedTuple):
 
 
 class ErkfMemory(NamedTuple):
-    """What passes from one sample to the next, advanced in place: `ErkfState` as the kernels take it.
+    """State carried from one sample to the next, advanced in place: `ErkfState` in the form used by the
+    kernels.
 
-    x (n, 16) · P (N, ≥ N), the rest of each row 0, and seven rows of 0 behind it (`memory_of`) ·
-    before (n, 6) · dx (N,) injected last · refused (n,).
+    x (n, 16) · P (N, ≥ N), with the rest of each row 0, and seven additional rows of 0 (`memory_of`) · before
+    (n, 6) · dx (N,) injected last · refused (n,).
     """
 
     x: Floats
@@ -72,7 +73,8 @@ class ErkfMemory(NamedTuple):
 
 class ErkfSamples(NamedTuple):
     """A block: step (T,) s · acc, gyr (T, n, 3) · flags (T, n) · heading (T, n), or (0, n) for none ·
-    rolling (T, n) rad/s with which a foot in contact turns, or (0, n) for none."""
+    rolling (T, n) rate of a foot in contact, rad/s, or (0, n) for none.
+    """
 
     step: Floats
     acc: Floats
@@ -83,8 +85,9 @@ class ErkfSamples(NamedTuple):
 
 
 class ErkfOutput(NamedTuple):
-    """What a block gives: nominal (T, n, 16), of one segment where states are kept · heading_sd (T, n) ·
-    residual (T, J) · refused (T, n) · smoothed (T, n, 7) positions and orientations, or (0, n, 7)."""
+    """Output of a block: nominal (T, n, 16), of one segment if states are retained · heading_sd (T, n) ·
+    residual (T, J) · refused (T, n) · smoothed (T, n, 7) positions and orientations, or (0, n, 7).
+    """
 
     nominal: Floats
     heading_sd: Floats
@@ -93,14 +96,15 @@ class ErkfOutput(NamedTuple):
     smoothed: Floats
 
     def part(self, first: int, past: int) -> ErkfOutput:
-        """Where samples first … past − 1 are written."""
+        """The part for samples first … past − 1."""
         k = slice(first, past)
         return ErkfOutput(*(x[k] for x in self))  # type: ignore[arg-type] # the kinds of fields are known
 
 
 class ErkfScratch(NamedTuple):
-    """R (n, 3, 3) of the IMUs · U (blocks + 1, 3, 3), y (3,) of a block · vectors (10, 3) ·
-    taken (n,) zero velocities, their σ (n,) · slack (J,) m of the joint centres."""
+    """R (n, 3, 3) of the IMUs · U (blocks + 1, 3, 3), y (3,) of a block · vectors (10, 3) · taken (n,)
+    accepted zero velocities, their σ (n,) · slack (J,) m of the joint centres.
+    """
 
     R: Floats
     U: Floats
@@ -112,7 +116,7 @@ class ErkfScratch(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """Scalars of `ErkfParams`, negative where a correction is off."""
+    """Scalars of `ErkfParams`, negative if a correction is disabled."""
 
     m: int
     first: float
@@ -148,7 +152,7 @@ class Links(NamedTuple):
 
 @inner_njit(**UNCOUNTED)
 def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
-    """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose errors begin at b."""
+    """vᵀ S⁻¹ v ≤ gate for the zero velocity of the IMU whose error state begins at b."""
     S = P[b + 3 : b + 6, b + 3 : b + 6]
     a, d, f = S[0, 0] + sd * sd, S[1, 1] + sd * sd, S[2, 2] + sd * sd
     p, q, r = S[1, 0], S[2, 0], S[2, 1]
@@ -162,7 +166,7 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
-    """Move every IMU and the covariance over the time before sample k; F (n, 5, 3, 3) is kept."""
+    """Propagate all IMUs and the covariance to sample k; F (n, 5, 3, 3) is retained."""
     x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
     R, vectors, m, dt = scratch.R, scratch.vectors, noise.m, samples.step[k]
     for i in range(F.shape[0]):
@@ -173,7 +177,7 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
-    """Add the process noise of sample k, its diagonal into Q (N,), and make that the last sample."""
+    """Add the process noise of sample k, with its diagonal in Q (N,), and make it the previous sample."""
     P, before, dt = memory.P, memory.before, samples.step[k]
     acc, gyr, flags, sd = samples.acc, samples.gyr, samples.flags, links.sd
     for i in range(before.shape[0]):
@@ -199,7 +203,8 @@ def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-d
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ignore[no-untyped-def]
-    """Write for sample k how far each zero velocity is believed, which are taken and which the gate refuses.
+    """For sample k write the uncertainty of each zero velocity, which are accepted and which the gate
+    rejects.
 
     All are judged from the predicted state, before any block, so that the order does not matter.
     """
@@ -230,7 +235,9 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: ignore[no-untyped-def]
-    """Take all blocks of sample k into the covariance and the correction; False if one is not positive."""
+    """Accumulate all blocks of sample k in covariance and correction; False if one is not positive
+    definite.
+    """
     x, P, dx, R, y, U = memory.x, memory.P, memory.dx, scratch.R, scratch.y, scratch.U
     place, H, V, E = record.place[slot], record.H[slot], record.V[slot], record.E[slot]
     m = noise.m
@@ -282,7 +289,9 @@ def correct(memory, samples, k, links, noise, scratch, record, slot):  # type: i
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-untyped-def]
-    """Move the correction into the state, and write that (n, 16) and its headings' deviations (n,)."""
+    """Inject the correction into the state; write the state (n, 16) and its heading standard deviations
+    (n,).
+    """
     x, P, dx, R = memory.x, memory.P, memory.dx, scratch.R
     for i in range(x.shape[0]):
         b = i * noise.m
@@ -304,7 +313,9 @@ def inject(memory, noise, scratch, nominal, heading_sd):  # type: ignore[no-unty
 
 @inner_njit(**UNCOUNTED)
 def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
-    """Write how far both ends of each joint are apart (J,), m, in states x (n, 16) turned by `scratch.R`."""
+    """Write the distance (J,) of the two ends of each joint, m, for states x (n, 16) with rotations
+    `scratch.R`.
+    """
     y = scratch.y
     for j in range(residual.shape[0]):
         a, c = links.ends[j, 0], links.ends[j, 1]
@@ -318,8 +329,9 @@ def measure_joints(x, links, scratch, residual):  # type: ignore[no-untyped-def]
 def advance(  # type: ignore[no-untyped-def]
     memory, samples, k, links, noise, scratch, record, slot, output, row
 ):
-    """Filter sample k of a block, its state into a row of `output.nominal`: the one rule of a file and a
-    stream; False if the covariance broke."""
+    """Filter sample k of a block, its state into a row of `output.nominal`: shared by files and streams;
+    False if the covariance failed.
+    """
     predict(memory, samples, k, noise, scratch, record.F[slot])
     add_noise(memory, samples, k, links, noise, record.Q[slot])
     judge_contacts(memory, samples, k, noise, scratch, record.Q[slot], output.refused[k])
@@ -334,7 +346,7 @@ def advance(  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
-    """Write the state into one row (`row_length`,), of P what is on and below the diagonal."""
+    """Write the state into one row (`row_length`); of P only the lower triangle."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
@@ -352,7 +364,7 @@ def keep_state(memory, row):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
-    """The way back of `keep_state`; above the diagonal P stays as it is."""
+    """Inverse of `keep_state`; the upper triangle of P is left unchanged."""
     x, before, P, at = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
@@ -369,7 +381,7 @@ def restore_state(memory, row):  # type: ignore[no-untyped-def]
 
 
 def row_length(n: int, N: int) -> int:
-    """Numbers in which `keep_state` writes a state of n IMUs and N errors."""
+    """Length of the row written by `keep_state` for n IMUs and N errors."""
     return n * (16 + 6 + 1) + N + N * (N + 1) // 2
 
 
@@ -377,20 +389,20 @@ def row_length(n: int, N: int) -> int:
 def filter_segments(  # type: ignore[no-untyped-def]
     memory, samples, links, noise, record, output, kept, segment, smoothing, lam,
 ):  # fmt: skip
-    """Filter a block, `memory` in place; sample at which the covariance broke, or −1.
+    """Filter a block, `memory` in place; returns the sample at which the covariance failed, or −1.
 
-    The one entry for live blocks, whole takes and the smoother, because `advance` takes a quarter of a minute
-    to compile. All are given as plain tuples: numba looks at the fields of a named one anew in every call,
-    0.3 µs each.
+    A single entry point for live blocks, whole recordings and the smoother, because `advance` takes a quarter
+    of a minute to compile. All arguments are plain tuples: numba resolves the fields of a named tuple at
+    every call, which costs 0.3 µs each.
 
     Parameters
     ----------
-    kept : (S, `row_length`) the state before each segment of so many samples, written, or with smoothing
-        read. No rows: the block is one segment, and no state is kept.
-    record : room for one sample, or with smoothing for a segment.
+    kept : (S, `row_length`) the state before each segment of this many samples, written, or with smoothing
+        read. No rows: the block is one segment, and no state is retained.
+    record : with room for one sample, or with smoothing for a segment.
     smoothing : filter each segment again from its row, the last first, and smooth it.
-    lam : (N,) the adjoint λ after the block, zeros at the end of a take; with smoothing that before it is
-    written.
+    lam : (N,) the adjoint λ after the block, zeros at the end of a recording; with smoothing that before it
+        is written.
     """
     memory = ErkfMemory(*memory)
     samples = ErkfSamples(*samples)
@@ -414,11 +426,11 @@ def filter_segments(  # type: ignore[no-untyped-def]
 def run_segments(  # type: ignore[no-untyped-def]
     memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint,
 ):  # fmt: skip
-    """What `filter_segments` does, in room that it gives.
+    """`filter_segments` with work arrays provided by the caller.
 
-    Like all that runs for every sample compiled without numba's counting of references (`_nrt`), which can
-    make no arrays: every part of an array was counted, a fifth of the time of 15 states and a third of 9.
-    adjoint : λ (N,) as `filter_segments` takes it, d (N,), `swept` (K, N).
+    Like everything that runs per sample it is compiled without numba's reference counting (`_nrt`) and cannot
+    allocate arrays: counting every array slice took a fifth of the time with 15 states and a third with 9.
+    adjoint : λ (N,) as in `filter_segments`, d (N,), `swept` (K, N).
     """
     n, N, T = memory.x.shape[0], memory.P.shape[0], samples.step.shape[0]
     keeps = kept.shape[0] > 0
@@ -457,7 +469,7 @@ def run_segments(  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def measure_smoothed(states, links, scratch, residual):  # type: ignore[no-untyped-def]
-    """Write how far the two ends of each joint are apart in states (K, n, 16), (K, J), m."""
+    """Write the distances (K, J) of the two ends of each joint for states (K, n, 16), m."""
     for k in range(states.shape[0]):
         for i in range(states.shape[1]):
             to_matrix(states[k, i, 6:10], scratch.R[i])

@@ -1,8 +1,9 @@
-"""Several numbers of a row at a time in compiled loops: eight, or one where Numba was not tested with eight.
+"""Several numbers of a row at once in compiled loops: eight, or one with Numba versions not tested with
+eight.
 
-LLVM does so on its own where it can prove that what is written is not what is read. Of rows of one covariance
-it can not: it asks before every loop, and loops here are a dozen lines of the cache long. Same operations in
-the same order, so the same bits with either.
+LLVM vectorises on its own where it can prove that written and read memory do not overlap. For rows of one
+covariance it cannot: it inserts a check before every loop, and loops here are only a dozen cache lines long.
+Both variants perform the same operations in the same order and give bit-identical results.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""The ErKF as it runs live: the offline kernel on the next samples, without its per-call checks.
+"""The ErKF in real time: the offline kernel on incoming samples, without its per-call checks.
 
-Live set: nine states, joint centres known to 3 cm as for all people, and zero velocity believed as far as a
-trailing rule allows. On seven virtual people, neura_walk and gaitmap_foot: flexions within 0.7° of the truth
-and stride lengths within 1 % of it; with joint centres of 1 cm the flexions are 0.3 to 0.5° worse.
+Live parameters: nine states, joint centres known to 3 cm as for all people, and zero velocities weighted
+according to the limits of a trailing rule. On seven simulated people, neura_walk and gaitmap_foot: flexion
+angles within 0.7° and stride lengths within 1 % of the truth; with joint centres of 1 cm the angles are 0.3
+to 0.5° worse.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ strides of simulated people 8 to 17 mm short instead of 6 short to 8 long."""
 
 
 def live_params() -> ErkfParams:
-    """The live set."""
+    """The live parameters."""
     return replace(
         ErkfParams.live(),
         joint_centre_sd=CENTRE_SD_M,
@@ -65,8 +66,9 @@ def live_params() -> ErkfParams:
 
 
 class SignalBlock(NamedTuple):
-    """A block as the filters take it: acc, gyr (T, n, 3) corrected and bridged, valid (T, n), still (T, n, 2)
-    as `StillnessDetector` tells, patched (T, n) as in `ErkfInputs`."""
+    """A block of filter inputs: acc, gyr (T, n, 3) corrected and bridged, valid (T, n), still (T, n, 2)
+    from `StillnessDetector`, patched (T, n) as in `ErkfInputs`.
+    """
 
     acc: Floats
     gyr: Floats
@@ -82,7 +84,7 @@ class SignalBlock(NamedTuple):
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _flag(valid, still, patched, foot, flags):  # type: ignore[no-untyped-def]
-    """Write the kernel's bits (T, n) of what is measured, stands and rests."""
+    """Write the kernel's flags (T, n) for measured, foot in contact, and rest."""
     for k in range(valid.shape[0]):
         for i in range(valid.shape[1]):
             flags[k, i] = 0 if valid[k, i] else INVALID
@@ -95,14 +97,14 @@ def _flag(valid, still, patched, foot, flags):  # type: ignore[no-untyped-def]
 
 
 class LiveErkf:
-    """The filter of one tree; any division into blocks gives the same bits.
+    """The filter of one tree; results are bit-identical for any division into blocks.
 
-    `broken` once its covariance is no longer positive definite: units, places or the order of the sensors are
-    wrong, and it does not come back.
+    `broken` after its covariance has lost positive definiteness: units, positions or the order of the sensors
+    are wrong, and it does not recover.
 
     Parameters
     ----------
-    standing : first block, everybody stands still throughout. q : (n, 4) sensor orientations at its start.
+    standing : first block, quiet standing throughout. q : (n, 4) sensor orientations at its start.
     """
 
     def __init__(
@@ -134,8 +136,8 @@ class LiveErkf:
     def push(self, signals: SignalBlock) -> tuple[Floats, Floats]:
         """States (T, n, 16) and distances (T, joints) of the ends of each joint; NaN once it is `broken`.
 
-        NaN too is a foot that was lost for long, until it rests again, and for one sample a foot that begins
-        anew because its rest does not fit its path: no distance reaches across that.
+        Also NaN: a foot after a long data loss until its next rest, and one sample of a foot that is
+        reinitialised because its rest contradicts its path, so that no distance spans the discontinuity.
         """
         T, n = signals.valid.shape
         output = new_output(self.tree, T)
@@ -175,7 +177,7 @@ class LiveErkf:
         return states, residual
 
     def _filter(self, samples: tuple[NDArray[Any], ...], output: ErkfOutput) -> None:
-        """Filter some samples; NaN from where the covariance breaks."""
+        """Filter some samples; NaN from the point where the covariance fails."""
         memory, links, noise, record = self._given
         broke = filter_segments(
             memory, samples, links, noise, record, tuple(output), NONE_KEPT, 0, False, self._lam
@@ -184,11 +186,12 @@ class LiveErkf:
             output.nominal[broke:], output.residual[broke:], self.broken = np.nan, np.nan, True
 
     def _settles(self, signals: SignalBlock, adrift: Bools) -> Iterator[tuple[int, int]]:
-        """Sample and foot where one that hangs on nothing rests again after a loss; marks all until they do.
+        """Yield sample and sensor for each unlinked foot that rests again after a loss; marks all feet until
+        they do.
 
-        A foot that is lost in mid-swing turns on by a right angle while its last rate is held. The joints
-        bring it back within a second, up to 50° off until then; for one by itself only its next rest says
-        where it is, and the filter alone took half a minute.
+        A foot lost in mid-swing keeps rotating by up to a right angle while its last rate is held. The joints
+        correct it within a second, with errors of up to 50° until then; an unlinked foot is corrected only at
+        its next rest, which took the filter alone half a minute.
         """
         for k in range(len(adrift)):
             for i in self.tree.feet:
@@ -202,12 +205,12 @@ class LiveErkf:
             adrift[k] = self._adrift
 
     def _looks(self, signals: SignalBlock) -> Iterator[tuple[int, int]]:
-        """Sample and foot where one that hangs on nothing has rested for long enough to be looked at."""
+        """Yield sample and sensor for each unlinked foot that has rested long enough to be checked."""
         look = self._looked_at.push(signals.still[:, :, 0])
         yield from ((k, i) for k, i in np.argwhere(look).tolist() if i in self._alone)
 
     def _settle(self, i: int, acc: Floats, gyr: Floats) -> None:
-        """Begin sensor i anew where it is, at rest: level by gravity, as it faces."""
+        """Reinitialise sensor i at its current position, at rest: levelled by gravity, heading unchanged."""
         memory, m, c = self._memory, self._noise.m, self._params
         x = memory.x[i]
         x[3:6] = 0.0
@@ -226,6 +229,6 @@ class LiveErkf:
 
 
 def _tilt(q: Floats, acc: Floats) -> float:
-    """Angle between the vertical and what an accelerometer at rest measures, by the sensor's orientation."""
+    """Angle between the vertical by the sensor's orientation and the specific force measured at rest."""
     force = rotate(q, acc)
     return float(np.arctan2(np.hypot(force[0], force[1]), force[2]))

@@ -1,4 +1,4 @@
-"""The live figure of a chain of sensors by the ErKF, and what can be told without any figure."""
+"""Live poses of a chain of sensors by the ErKF, and the reduced output without a complete chain."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LEVEL_S: Final = 0.1
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyped-def]
-    """Take the floor's height, as the resting feet see it, off a figure p (T, n, 3) in place."""
+    """Subtract the floor height, determined by the resting feet, from positions p (T, n, 3) in place."""
     for k in range(p.shape[0]):
         seen, count = 0.0, 0
         for f in range(feet.shape[0]):
@@ -36,12 +36,12 @@ def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _tell(q, p, valid, still, feet, shown, known, whole, foot_q, foot_p, stands, there):  # type: ignore[no-untyped-def]
-    """Write which of segments q (T, n, 4), p (T, n, 3) mean something, and the paths of the feet.
+    """Write the validity of segments q (T, n, 4), p (T, n, 3), and the paths of the feet.
 
     Parameters
     ----------
-    valid, still : (T, n), (T, n, 2) of the sensors. feet, shown : columns of the feet, of the figure.
-    known : (T, n) written. whole : (T,) written, all of the figure are known.
+    valid, still : (T, n), (T, n, 2) of the sensors. feet, shown : columns of the feet, of the displayed
+        segments. known : (T, n) written. whole : (T,) written, all displayed segments are known.
     foot_q, foot_p, stands, there : (T, F, ·) written, as `FootBlock`.
     """
     for k in range(q.shape[0]):
@@ -60,7 +60,7 @@ def _tell(q, p, valid, still, feet, shown, known, whole, foot_q, foot_p, stands,
 
 
 class LinkedBody:
-    """Pelvis and legs that hang together."""
+    """Linked pelvis and legs."""
 
     method: LiveMethod = ERKF.name
     attitudes: tuple[Segment, ...] = ()
@@ -83,11 +83,11 @@ class LinkedBody:
 
     @property
     def broken(self) -> bool:
-        """Whether the filter gave up."""
+        """Whether the filter has failed."""
         return self._filtered.broken
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
-        """The next samples; the first block is the whole standing window."""
+        """Process the next samples; the first block is the whole standing window."""
         tracked = self._filtered.push(raw)
         signals, q, p = tracked.signals, tracked.q, tracked.p
         self._notices += self._watch.push(tracked.residual, signals.valid, signals.still)
@@ -106,13 +106,13 @@ class LinkedBody:
         return BodyBlock(q, p, known, whole, paths)
 
     def drain_notices(self) -> list[Notice]:
-        """Joints whose ends are too far apart."""
+        """Notices on joints whose ends are too far apart."""
         fresh, self._notices = self._notices, []
         return fresh
 
 
 class UnlinkedSensors:
-    """Sensors that make no figure: each by itself, and the paths of the feet among them."""
+    """Sensors that do not form a body: independent orientations, and the paths of any feet among them."""
 
     method: LiveMethod = NO_FIGURE
     linked = False
@@ -124,22 +124,22 @@ class UnlinkedSensors:
 
     @property
     def broken(self) -> bool:
-        """The filter of the feet gave up."""
+        """Whether the filter of the feet has failed."""
         return self._feet is not None and self._feet.broken
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
-        """The next samples; the first block is the whole standing window."""
+        """Process the next samples; the first block is the whole standing window."""
         T = len(raw.valid)
         q = np.stack([raw.turned[s] for s in self.segments], axis=1)
         paths = make_empty_paths(T) if self._feet is None else self._feet.push(raw)
         return BodyBlock(q, np.full((*q.shape[:2], 3), np.nan), raw.valid, np.zeros(T, np.bool_), paths)
 
     def drain_notices(self) -> list[Notice]:
-        """None: there is nothing here that could fail."""
+        """Always empty: there is nothing that could fail."""
         return []
 
 
 def make_empty_paths(samples: int) -> FootBlock:
-    """Of a set without feet."""
+    """Empty paths of a sensor set without feet."""
     none = np.zeros((samples, 0), np.bool_)
     return FootBlock(np.zeros((samples, 0, 3)), np.zeros((samples, 0, 4)), none, none, none)

@@ -1,4 +1,6 @@
-"""Sensors of a live take through bridge, stillness and ErKF, and the paths of the feet."""
+"""Sensors of a live recording through gap bridging, stillness detection and ErKF, and the paths of the
+feet.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ from sagittal.core.timeline.columns import find_columns, take_columns, take_mask
 
 
 class FilteredBlock(NamedTuple):
-    """Signals as filtered; q (T, n, 4), p (T, n, 3) origins of segments; (T, joints) their ends apart, m."""
+    """Filtered signals; q (T, n, 4), p (T, n, 3) segment origins; (T, joints) distances of the joint ends,
+    m.
+    """
 
     signals: SignalBlock
     q: Floats
@@ -31,7 +35,8 @@ class FilteredBlock(NamedTuple):
 
 
 class FilteredSensors:
-    """Some sensors through bridge, stillness and ErKF; the first block is the whole standing window.
+    """Some sensors through gap bridging, stillness detection and ErKF; the first block is the whole standing
+    window.
 
     Parameters
     ----------
@@ -62,11 +67,11 @@ class FilteredSensors:
 
     @property
     def broken(self) -> bool:
-        """Whether the filter gave up."""
+        """Whether the filter has failed."""
         return self._filter is not None and self._filter.broken
 
     def push(self, raw: MeasuredBlock) -> FilteredBlock:
-        """The next samples."""
+        """Process the next samples."""
         measured_acc, measured_gyr, valid = take_columns(raw.acc, raw.gyr, raw.valid, self._columns)
         acc, gyr = self._bridge.push(measured_acc, measured_gyr, valid)
         filled = take_mask(raw.filled, self._columns)
@@ -81,18 +86,18 @@ class FilteredSensors:
 
 
 class FootPaths:
-    """Paths of feet, each by its own sensor: what distances are measured on where no chain links them."""
+    """Paths of feet, each from its own sensor: used for distances if no chain links them."""
 
     def __init__(self, filtered: FilteredSensors) -> None:
         self._filtered = filtered
 
     @property
     def broken(self) -> bool:
-        """Whether the filter gave up."""
+        """Whether the filter has failed."""
         return self._filtered.broken
 
     def push(self, raw: MeasuredBlock) -> FootBlock:
-        """The next samples."""
+        """Process the next samples."""
         x = self._filtered.push(raw)
         valid = x.signals.valid & np.isfinite(x.p[:, :, 0])
         still = np.ascontiguousarray(x.signals.still[:, :, 0])

@@ -1,4 +1,4 @@
-"""Whether the sensors hang together while somebody walks: the joints' two ends, watched live."""
+"""Live consistency check of linked sensors while walking: the distance of the two ends of each joint."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from sagittal.core.body.erkf.health import RESIDUAL_MM, TOLD
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 WINDOW_S: Final = 5.0
 """Of movement, over which the distance is averaged. Right set-ups then have 3 to 17 mm live (five simulated
@@ -19,11 +20,11 @@ people, neura_walk), exchanged or late sensors 26 to 130."""
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _watch(residual, valid, still, ends, window, total, count, worst):  # type: ignore[no-untyped-def]
-    """Add up squares (J,) of moving samples; `worst` (J,) gets the largest mean of a full window.
+    """Accumulate squares (J,) of moving samples; `worst` (J,) receives the largest mean of a full window.
 
     Returns
     -------
-    whether a window was full.
+    Whether a window was completed.
     """
     full = False
     for k in range(residual.shape[0]):
@@ -45,7 +46,7 @@ def _watch(residual, valid, still, ends, window, total, count, worst):  # type: 
 
 
 class JointWatch:
-    """Tells once of every joint whose two ends are too far apart; blocks do not matter."""
+    """Reports each joint whose two ends are too far apart once; independent of the division into blocks."""
 
     def __init__(self, tree: ImuTree, rate_hz: float) -> None:
         self._joints = tree.joints
@@ -56,7 +57,7 @@ class JointWatch:
         self._told = np.zeros(n, np.bool_)
 
     def push(self, residual: Floats, valid: Bools, still: Bools) -> list[Notice]:
-        """Distances (T, J) in m, valid (T, n), still (T, n, 2)."""
+        """Process distances (T, J) in m, valid (T, n), still (T, n, 2)."""
         given = residual, valid, still, self._ends, self._window, self._total, self._count, self._worst
         if not _watch(*given):
             return []
@@ -68,6 +69,6 @@ class JointWatch:
         found = []
         for j in np.flatnonzero(far):
             name, apart = self._joints[j].name, 1e3 * float(np.sqrt(self._worst[j]))
-            message = words.format(of=name, value=apart, warn=RESIDUAL_MM[0])
+            message = Message(words, of=name, value=apart, warn=RESIDUAL_MM[0])
             found.append(Notice(code, message, sensor=name.split("-")[-1], severity=severity))
         return found

@@ -1,7 +1,8 @@
-"""What the ErKF assumes: noise, measurement uncertainty and the start; three sourced sets.
+"""Assumptions of the ErKF: noise, measurement uncertainty and initial state; three parameter sets with
+sources.
 
 All are standard deviations. σ_a and σ_ω are per sample at the recording's rate (density · √rate, Potter 2021
-Table 1), inflated for what the model leaves out.
+Table 1), inflated for effects not modelled.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import Final, Literal
 import numpy as np
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 
 Integration = Literal["trapezoid", "euler"]
 """euler: Potter 2021 eq 8, the sample at the start of the step; it costs 0.6 to 0.9° at 100 Hz
@@ -28,29 +30,29 @@ SOFT_TISSUE: Final[Mapping[str, float]] = {"thigh_l": 0.2, "thigh_r": 0.2}
 
 @dataclass(frozen=True)
 class ErkfParams:
-    """Parameters of `filter_block` and `smooth`; None switches a correction off.
+    """Parameters of `filter_block` and `smooth`; None disables a correction.
 
     Parameters
     ----------
     states : per IMU, 9 (position, velocity, orientation) or 15 (with both biases).
-    acc_sd : m/s². gyr_sd : rad/s. gyr_sd_of : IMU → its own. impact : share c of the change of specific force
-        from sample to sample that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)²
+    acc_sd : m/s². gyr_sd : rad/s. gyr_sd_of : IMU → individual value. impact : fraction c of the
+        sample-to-sample change of specific force that is added as uncertainty, σ_a² + (c |f_k − f_k−1|)²
         (docs/science/erkf.md, "Impacts").
     gyr_walk, acc_walk : random walk of the biases, rad/s/√s and m/s²/√s (15 states).
-    zero_velocity_sd : m/s, of a foot that is still. roll_m : m, times |ω| the speed that the quietest moment
-        of a rolling foot has beside it: half of the 0.1 m that a sensor on the instep is off the ball, as
-        velocity over |ω| next to the still part of a stance is on gaitmap_foot (0.03 to 0.05 m forward, up to
-        0.1 m upward). gate : largest χ² of a zero velocity. reaccept_s : contact refused for so long is
-        accepted after all; then `reaccept_m` is added to the foot's uncertainty
-        (docs/science/erkf.md, "Zero velocity").
+    zero_velocity_sd : m/s, of a foot that is still. roll_m : m, multiplied by |ω| the additional uncertainty
+        at the quietest moment of a rolling foot: half of the 0.1 m between a sensor on the instep and the
+        ball, consistent with velocity over |ω| next to the still part of a stance in gaitmap_foot (0.03 to
+        0.05 m forward, up to 0.1 m upward). gate : largest χ² of a zero velocity. reaccept_s : contact
+        rejected for this long is accepted after all; `reaccept_m` is then added to the uncertainty of the
+        foot (docs/science/erkf.md, "Zero velocity").
     tilt_sd : of the direction of f. joint_centre_sd : m. joint_axis_sd : rad.
     gap_acc_sd, gap_gyr_sd : in place of acc_sd and gyr_sd while an IMU is lost.
-    patch_s : more than this between two samples, filled by a straight line, is a patch. patch_acc_sd,
-        patch_gyr_sd : beside acc_sd and gyr_sd in it (docs/science/erkf.md, "Lost packets").
-    start_* : of the first sample; `start_heading_sd` about the vertical, must cover the first headings'
+    patch_s : longer linearly interpolated gaps between two samples are patches. patch_acc_sd, patch_gyr_sd :
+        added to acc_sd and gyr_sd in them (docs/science/erkf.md, "Lost packets").
+    start_* : of the first sample; `start_heading_sd` about the vertical must cover the initial heading
         errors.
-    moving_* : the same where a recording starts mid-walk; the bias where it has no rest at all, as well as a
-        walk tells it (docs/science/erkf.md, "Start").
+    moving_* : the same for a recording that starts mid-walk; the bias applies if it has no rest at all and
+        corresponds to the accuracy of estimating it from walking (docs/science/erkf.md, "Start").
     """
 
     states: Literal[9, 15] = 15
@@ -86,17 +88,28 @@ class ErkfParams:
 
     def __post_init__(self) -> None:
         if self.states not in (9, 15):
-            raise ParameterError("states_unknown", f"{self.states} states per IMU, expected 9 or 15.")
+            raise ParameterError(
+                "states_unknown", Message("{states} states per IMU, expected 9 or 15.", states=self.states)
+            )
         if self.integration not in ("trapezoid", "euler"):
             raise ParameterError(
-                "integration_unknown", f"integration is '{self.integration}', expected trapezoid or euler."
+                "integration_unknown",
+                Message(
+                    "integration is '{integration}', expected trapezoid or euler.",
+                    integration=self.integration,
+                ),
             )
         for name, value in (*vars(self).items(), *self.gyr_sd_of.items()):
             if isinstance(value, float) and not (np.isfinite(value) and value >= 0.0):
-                raise ParameterError("deviation_range", f"{name} = {value:g} is not 0 or above.")
+                raise ParameterError(
+                    "deviation_range",
+                    Message("{name} = {value:g} is not 0 or above.", name=name, value=value),
+                )
         for name in ("zero_velocity_sd", "tilt_sd", "joint_centre_sd", "joint_axis_sd"):
             if getattr(self, name) == 0.0:
-                raise ParameterError("deviation_range", f"{name} is 0; the filter needs it above 0.")
+                raise ParameterError(
+                    "deviation_range", Message("{name} is 0; the filter needs it above 0.", name=name)
+                )
 
     @classmethod
     def offline(cls) -> ErkfParams:
@@ -105,19 +118,21 @@ class ErkfParams:
 
     @classmethod
     def people(cls) -> ErkfParams:
-        """`offline` for sensors on skin: joint centres known to 1.5 cm, wrong by the same in every step
-        (docs/science/erkf.md, "Joints err alike")."""
+        """`offline` for sensors on skin: joint centres known to 1.5 cm, with the same error in every step
+        (docs/science/erkf.md, "Joints err alike").
+        """
         return cls(joint_centre_sd=0.045)
 
     @classmethod
     def live(cls) -> ErkfParams:
-        """For samples as they come: 9 states, the gyroscopes' biases frozen from rest (same section)."""
+        """For streams: 9 states, gyroscope biases fixed from rest (same section)."""
         return cls(states=9, gyr_sd=0.02)
 
     @classmethod
     def paper(cls) -> ErkfParams:
-        """Potter 2021 Table 1 at 512 Hz, σ_JA = 0.02 rad as its Table 2 demands
-        (docs/science/erkf.md, "Departures from the paper")."""
+        """Potter 2021 Table 1 at 512 Hz, σ_JA = 0.02 rad as required by its Table 2 (docs/science/erkf.md,
+        "Departures from the paper").
+        """
         return cls(
             states=9,
             integration="euler",

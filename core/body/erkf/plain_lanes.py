@@ -1,4 +1,4 @@
-"""`lanes` of one number, with nothing but what Numba promises to keep."""
+"""Scalar variant of `lanes`, using only the documented interface of Numba."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ STEP: Final = 1
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def read_lanes(array, row, column):  # type: ignore[no-untyped-def]
-    """A number of an array (rows, columns)."""
+    """Read a number from an array (rows, columns)."""
     return array[row, column]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def write_lanes(array, row, column, lanes):  # type: ignore[no-untyped-def]
-    """The way back of `read_lanes`."""
+    """Inverse of `read_lanes`."""
     array[row, column] = lanes
 
 
@@ -30,7 +30,7 @@ def spread(number):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def read_columns(array, row, column):  # type: ignore[no-untyped-def]
-    """Eight numbers of a row from a place on."""
+    """Eight numbers of a row from a position on."""
     return (
         array[row, column], array[row, column + 1], array[row, column + 2], array[row, column + 3],
         array[row, column + 4], array[row, column + 5], array[row, column + 6], array[row, column + 7],
@@ -39,7 +39,7 @@ def read_columns(array, row, column):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def write_columns(array, row, column, columns):  # type: ignore[no-untyped-def]
-    """The way back of `read_columns`."""
+    """Inverse of `read_columns`."""
     for k in range(8):
         array[row, column + k] = columns[k]
 

@@ -1,4 +1,4 @@
-"""A calibrated take through the ErKF and its smoother: orientations, figure and paths of the feet."""
+"""A calibrated recording through the ErKF and its smoother: orientations, poses and paths of the feet."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ class ErkfRun:
 
     Parameters
     ----------
-    inputs : without signals and rolling, which nobody reads after the filter. rest : samples of the standing
-        start, None = the take starts mid-walk.
+    inputs : without signals and rolling, which are not needed after filtering. rest : samples of initial
+        standing, None = the recording starts mid-walk.
     """
 
     tree: ImuTree
@@ -63,7 +63,7 @@ class ErkfRun:
         return cast("tuple[Segment, ...]", self.tree.imus)
 
     def forget_track(self) -> ErkfRun:
-        """The run without its track, once segments and health were read from it."""
+        """The run without its track, once segments and health have been extracted."""
         none = np.empty((0, len(self.tree.imus)))
         joints, refused = np.empty((0, len(self.tree.joints))), none.astype(np.bool_)
         return replace(self, track=ErkfTrack((), (), none, joints, refused, np.empty((0, 0, 16))))
@@ -78,16 +78,17 @@ def run_erkf(
     arms: MeasuredArms | None = None,
     filtered: Callable[[], None] = do_nothing,
 ) -> ErkfRun:
-    """Filter and smooth a take with the sensors of some segments; neighbours are joined, others run beside.
+    """Filter and smooth a recording with the sensors of some segments; neighbours are linked, others run
+    independently.
 
     Parameters
     ----------
-    arms : places of sensors and centres of joints; None = nominal. filtered : called when the orientations
-        are read for the last time and nothing can fail any more.
+    arms : sensor positions and joint centres; None = nominal. filtered : called after the last use of the
+        orientations, when no more errors can occur.
 
     Raises
     ------
-    EstimationError of `person_tree` and `smooth`.
+    EstimationError as `person_tree` and `smooth`.
     """
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in segments}
     tree = person_tree(
@@ -115,7 +116,9 @@ def run_erkf(
 def _find_inputs(
     tree: ImuTree, calibrated: CalibratedRecording, segments: Sequence[Segment], params: ErkfParams
 ) -> TakeInputs:
-    """The filter's inputs of a take; what is bridged over lost samples is held, all else only laid out."""
+    """The filter inputs of a recording; signals bridged across lost samples are stored, all others
+    computed on demand.
+    """
     recording = calibrated.recording
     valid = np.stack([recording.sensors[s].valid for s in segments], axis=1)
     patched = find_patches(recording, segments, params.patch_s)
@@ -134,7 +137,7 @@ def _find_inputs(
 
 
 def find_patches(recording: UniformRecording, segments: Sequence[Segment], longest_s: float) -> Bools:
-    """Samples (T, n) filled over holes with more than `longest_s` between the samples beside them."""
+    """Samples (T, n) interpolated across gaps longer than `longest_s` between the adjacent samples."""
     patched = np.zeros((len(recording.t_s), len(segments)), np.bool_)
     for i, segment in enumerate(segments):
         for start, stop in find_runs(recording.sensors[segment].interpolated):
@@ -144,18 +147,21 @@ def find_patches(recording: UniformRecording, segments: Sequence[Segment], longe
 
 @dataclass(frozen=True, eq=False)
 class SegmentTracks:
-    """Where a run's segments are: q, p : segment → (T, 4) and origin (T, 3) m, in W."""
+    """Trajectories of the segments of a run; q, p : segment → orientation (T, 4) and origin (T, 3) m, in
+    W.
+    """
 
     q: Mapping[Segment, Floats]
     p: Mapping[Segment, Floats]
 
 
 def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTracks:
-    """Segments of a run's smoothed sensors.
+    """Segment trajectories from the smoothed sensors of a run.
 
     Parameters
     ----------
-    in_place : written over `run.track`, which nobody may read any more: 144 MB of an hour of seven sensors.
+    in_place : overwrite `run.track`, which must not be used afterwards: saves 144 MB for an hour of seven
+        sensors.
     """
     q, p = {}, {}
     for i, segment in enumerate(run.segments):
@@ -172,7 +178,7 @@ def find_segment_tracks(run: ErkfRun, *, in_place: bool = False) -> SegmentTrack
 def replace_orientations(
     run: ErkfRun, orientations: Orientations, tracks: SegmentTracks | None = None
 ) -> Orientations:
-    """The given orientations with those of the run's segments in their place."""
+    """The given orientations with those of the run's segments replaced."""
     found = (tracks or find_segment_tracks(run)).q
     return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
 
@@ -184,15 +190,15 @@ def place_figure(
     body: BodyModel,
     tracks: SegmentTracks,
 ) -> Poses:
-    """The pelvis and every whole leg where they are in the room.
+    """Position the pelvis and every complete leg in W.
 
-    Heights are levelled: between the times at which a foot rests, what its ankle is above or below its height
-    over the floor is taken off, so that a flat floor stays at z = 0; of stairs this figure knows nothing. The
-    figure has the body model's lengths, whatever centres of joints were measured.
+    Heights are levelled: between the rests of a foot, the deviation of its ankle from the nominal height
+    above the floor is subtracted, so that a flat floor stays at z = 0; stairs are not represented. Segments
+    have the lengths of the body model, regardless of estimated joint centres.
 
     Parameters
     ----------
-    orientations : refined by this run.
+    orientations : as refined by this run.
     """
     legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
     shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
@@ -223,11 +229,11 @@ def place_figure(
 def foot_tracks(
     run: ErkfRun, orientations: Orientations, body: BodyModel, tracks: SegmentTracks | None = None
 ) -> FootTracks:
-    """Paths of the run's feet; linked when both hang on the same pelvis.
+    """Paths of the run's feet; linked if both are connected to the same pelvis.
 
     Parameters
     ----------
-    orientations : refined by this run.
+    orientations : as refined by this run.
     """
     at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
     patched, paths = run.inputs.patched, (tracks or find_segment_tracks(run)).p
@@ -256,10 +262,10 @@ def _hang_together(
     side: Side,
     body: BodyModel,
 ) -> dict[Segment, Floats]:
-    """Origins (n, 3) of shank and thigh for a figure of the body's own lengths.
+    """Origins (n, 3) of shank and thigh for a body with the nominal lengths.
 
-    Where centres were measured, a drawn segment ends elsewhere than at its joint. From the foot up each is
-    moved until its end meets the next; what is left over lies at the hip, where nobody sees it.
+    With estimated joint centres, nominal segments do not end exactly at their joints. From the foot up each
+    is shifted to meet the next; the remaining gap is at the hip, where it is not visible.
     """
     nominal = joint_places(body)
     joints = {(run.segments[j.proximal], run.segments[j.distal]): j for j in run.tree.joints}
@@ -273,7 +279,7 @@ def _hang_together(
 
 
 def _floor(above: Mapping[Side, Floats], still: Mapping[Side, Bools]) -> Floats:
-    """Height (n,) of the floor as the run sees it: the feet's where they rest, linear between."""
+    """Height (n,) of the floor estimated by the run: that of the feet at rest, linear in between."""
     n = len(next(iter(above.values())))
     seen = np.zeros(n)
     count = np.zeros(n)

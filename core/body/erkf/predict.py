@@ -1,8 +1,8 @@
-"""One step of time of the ErKF: Potter 2021 eq 8–15 with both ends of the step, and P ← F P Fᵀ + Q.
+"""One time step of the ErKF: Potter 2021 eq 8–15 with both ends of the step, and P ← F P Fᵀ + Q.
 
-F couples nothing between IMUs, so P is passed through by blocks: rows, then columns, of the lower block
-triangle. Only P on and below its diagonal is kept; what is above is whatever was there. (A full row and
-column pass is not symmetric in floating point, and the asymmetry grows without bound: docs/science/erkf.md,
+F has no coupling between IMUs, so P is processed by blocks: rows, then columns, of the lower block triangle.
+Only the lower triangle of P is maintained; the upper one has arbitrary contents. (A full row and column pass
+is not symmetric in floating point, and the asymmetry grows without bound: docs/science/erkf.md,
 "Prediction".)
 """
 
@@ -39,7 +39,7 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
     `first` is the weight of the sample at the start of the step: 1 Euler (eq 8), ½ trapezoid. F is the exact
-    derivative: with φ = ω̄Δt, S = Exp(−φ), Γ = −J_r(φ)Δt, and f̄ at both ends turned with its own
+    derivative: with φ = ω̄Δt, S = Exp(−φ), Γ = −J_r(φ)Δt, and f̄ at both ends rotated by the respective
     orientation.
     """
     phi, f0, f1, accelerated = scratch[0], scratch[1], scratch[2], scratch[3]
@@ -107,7 +107,7 @@ def propagate(P, F, m, dt):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def move_rows(P, f, b, m, dt, half):  # type: ignore[no-untyped-def]
-    """The rows of one IMU, whose errors begin at b, up to the end of its block."""
+    """The rows of one IMU, whose error state begins at b, up to the end of its block."""
     a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
     for c in range(0, b + m, STEP):
         t0, t1, t2 = read_lanes(P, b + 6, c), read_lanes(P, b + 7, c), read_lanes(P, b + 8, c)
@@ -128,7 +128,7 @@ def move_rows(P, f, b, m, dt, half):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def move_columns(P, f, r, b, m, dt, half):  # type: ignore[no-untyped-def]
-    """As many rows as lanes have numbers from r on, in the columns of the IMU whose errors begin at b."""
+    """As many rows from r on as there are lanes, in the columns of the IMU whose error state begins at b."""
     a, s, d, g, e = f[A], f[S], f[D], f[GAMMA], f[C]
     p0, p1, p2, v0, v1, v2, t0, t1 = read_columns(P, r, b)
     # of 15 columns the second eight begin with t1, of 9 with p1

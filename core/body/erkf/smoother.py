@@ -1,10 +1,10 @@
 """Fixed-interval smoother of the ErKF: modified Bryson–Frazier with checkpoints.
 
-Bierman 1973, "Fixed interval smoothing with discrete measurements": the adjoint λ goes back through the very
-blocks of the forward pass, so no covariance is inverted, and x^s = x ⊞ G(−P λ) (G the reset of the last
-correction). −P λ is carried forward without P (Koopman 1993). Only one state per segment is kept; a segment
-is filtered again, recorded, and swept back. It equals the Rauch–Tung–Striebel smoother at a hundredth of its
-memory (docs/science/erkf.md, "Smoother").
+Bierman 1973, "Fixed interval smoothing with discrete measurements": the adjoint λ is propagated backward
+through the same blocks as the forward pass, so no covariance is inverted, and x^s = x ⊞ G(−P λ) (G the reset
+of the last correction). −P λ is propagated forward without P (Koopman 1993). Only one state per segment is
+stored; a segment is filtered again, recorded, and swept backward. The result equals that of the
+Rauch–Tung–Striebel smoother at a hundredth of its memory (docs/science/erkf.md, "Smoother").
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from sagittal.core.body.erkf.kernel import filter_segments, row_length
 from sagittal.core.body.erkf.params import ErkfParams
 from sagittal.core.body.tree import ImuTree
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.signals.memory import make_pages
 
 SEGMENT = 128
@@ -38,7 +39,7 @@ AT_ONCE: Final = 1 << 12
 
 
 def do_nothing() -> None:
-    """What is done after the filter where nothing is."""
+    """Default callback: does nothing."""
 
 
 def smooth(
@@ -53,15 +54,16 @@ def smooth(
 
     Parameters
     ----------
-    segment : samples between the states that are kept, ≥ 2; changes memory, and the result by rounding only.
-        None = 128, and for takes above eleven minutes what keeps states and record small together.
-    filtered : called once the filter has come to the end, before anything of the size of the take is made:
-        what follows raises nothing.
+    segment : samples between stored states, ≥ 2; affects memory, and the result only by rounding. None = 128,
+        and for recordings longer than eleven minutes the value that minimises the size of states and record
+        together.
+    filtered : called after the filter has finished, before large arrays are allocated; no errors are raised
+        afterwards.
 
     Returns
     -------
-    The smoothed track and the filter's state after the last sample. `heading_sd` and `refused` are the
-    filter's, `joint_residual` is that of the smoothed states.
+    The smoothed track and the filter's state after the last sample. `heading_sd` and `refused` are from the
+    filter, `joint_residual` from the smoothed states.
 
     Raises
     ------
@@ -72,7 +74,9 @@ def smooth(
     if segment is None:
         segment = max(SEGMENT, math.isqrt(T // 4))
     if segment < 2:
-        raise ParameterError("segment_range", f"Segments of {segment} samples; at least 2.")
+        raise ParameterError(
+            "segment_range", Message("Segments of {segment} samples; at least 2.", segment=segment)
+        )
     whole, N = -(-T // segment), n * params.states
     at_once = max(1, AT_ONCE // segment)
     blocks = [(first, min(first + at_once, whole)) for first in range(0, whole, at_once)]

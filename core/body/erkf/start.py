@@ -1,13 +1,14 @@
-"""The first state of the ErKF: from standing, or mid-walk with wide uncertainty of tilt and velocity.
+"""The initial state of the ErKF: from standing, or mid-walk with large uncertainty of tilt and velocity.
 
-Tilt comes from the mean specific force; heading from the convention that all segments face +x at the start
-(a common heading, free gauge); positions from the tree with the ankles at their height over the floor, so
+Tilt comes from the mean specific force; heading from the convention that all segments face +x at the start (a
+common heading is a free gauge); positions from the tree with the ankles at their height above the floor, so
 that joint centres coincide. Equations: docs/science/erkf.md, "Start".
 
-Positions laid out with wrong orientations are wrong by them, so the first covariance joins both: taken as
-independent, the joint centres of a person who stands, which say nothing of headings, would seem to measure
-them. And no measurement tells the heading that all have in common, nor does its uncertainty: left in, the
-linearised filter believes to learn it in every turn and moves the whole path, strides with it.
+Errors of the initial orientations propagate into the initial positions, so the initial covariance correlates
+both: if they were independent, the joint centres of a standing person, which carry no information on
+headings, would appear to measure them. The common heading is not observable, and its uncertainty is excluded:
+otherwise the linearised filter appears to gain information on it in every turn and shifts the whole path,
+including strides.
 """
 
 from __future__ import annotations
@@ -35,18 +36,18 @@ def start_state(
     q: Floats | None = None,
     bias_age_s: float | None = None,
 ) -> ErkfState:
-    """State at the first sample, before any correction.
+    """The state at the first sample, before any correction.
 
     Parameters
     ----------
-    rest : samples start … stop − 1 at which everybody stands still, beginning close to the first sample; None
-        for a recording that starts mid-walk: tilt and velocity are then taken as widely unknown.
-    q : (n, 4) sensor orientations at the first sample from elsewhere (an orientation filter); else from
+    rest : samples start … stop − 1 of quiet standing, beginning close to the first sample; None for a
+        recording that starts mid-walk: tilt and velocity then have a large uncertainty.
+    q : (n, 4) sensor orientations at the first sample from another source (an orientation filter); else from
         gravity.
-    bias_age_s : for a start mid-walk, time to the rest, elsewhere in the take, whose mean rate was taken off
-        as gyroscope bias: the bias has walked since, no more. None when there was no rest at all: biases are
-        widely unknown, and one foot alone then takes errors of scale and impact for them (30 mm per stride on
-        a real walk whose only rest is at its end).
+    bias_age_s : for a start mid-walk, time to the rest elsewhere in the recording whose mean rate was
+        subtracted as gyroscope bias: the uncertainty is that of the random walk in between. None without any
+        rest: biases have a large uncertainty, and for a single foot they absorb errors of scale and impact
+        (30 mm per stride in a real walk with a rest only at its end).
     """
     n, m = len(tree.imus), params.states
     standing = rest is not None
@@ -110,7 +111,7 @@ def find_parts(tree: ImuTree) -> NDArray[np.int64]:
 
 
 def _outward(tree: ImuTree) -> Iterator[Joint]:
-    """Joints from the roots on, those that reach a sensor first."""
+    """Joints in order from the roots outward."""
     reached, joints = set(tree.roots()), list(tree.joints)
     while joint := next((j for j in joints if j.proximal in reached), None):
         joints.remove(joint)
@@ -120,8 +121,8 @@ def _outward(tree: ImuTree) -> Iterator[Joint]:
 
 
 def _spread(tree: ImuTree, q: Floats, m: int) -> Floats:
-    """Derivative (n·m, n·m) of the errors at the start by independent ones: the position of a sensor in the
-    chain carries those of its neighbour's position and, by the levers, of both orientations.
+    """Derivative (n·m, n·m) of the initial errors by independent ones: the position error of a sensor in
+    the chain includes that of its neighbour and, through the lever arms, those of both orientations.
     """
     R = to_matrix(q)
     # np.cross(1, r) = [r]×
@@ -135,7 +136,7 @@ def _spread(tree: ImuTree, q: Floats, m: int) -> Floats:
 
 
 def _level(f: Floats, forward: Floats) -> Floats:
-    """Orientation (4,) with f upwards and the forward axis towards +x."""
+    """Orientation (4,) with f pointing up and the forward axis towards +x."""
     z = f / np.linalg.norm(f)
     y = np.cross(z, forward)
     y /= np.linalg.norm(y)

@@ -1,4 +1,5 @@
-"""The way back over a recorded segment: λ from block to block, and what it moves the filtered states by.
+"""Backward pass over a recorded segment: λ from block to block, and the resulting correction of the filtered
+states.
 
 Equations: docs/science/erkf.md, "Smoother".
 """
@@ -13,7 +14,7 @@ from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 @inner_njit(**UNCOUNTED)
 def copy_row(source, target):  # type: ignore[no-untyped-def]
-    """Write one row (k,) over another; numba compiles this in a tenth of the time of `target[:] = source`."""
+    """Copy one row (k,) to another; compiles ten times faster in numba than `target[:] = source`."""
     for c in range(len(target)):
         target[c] = source[c]
 
@@ -30,7 +31,7 @@ def sweep_back(lam, step, record, m, swept):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
-    """d ← −P λ, of P only what is on and below the diagonal."""
+    """d ← −P λ, using only the lower triangle of P."""
     d[:] = 0.0
     for r in range(len(lam)):
         for c in range(r):
@@ -41,10 +42,10 @@ def multiply_lower(P, lam, d):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def move_smoothed(d, step, record, m, swept, out):  # type: ignore[no-untyped-def]
-    """Turn a segment's filtered states `out` (K, n, 16) into smoothed ones.
+    """Convert a segment's filtered states `out` (K, n, 16) to smoothed ones.
 
-    d (N,) is −P λ before the segment. From sample to sample d ← F d − Q λ − d̂x, which is −P λ again without a
-    P (the forward form of the disturbance smoother: Koopman 1993; docs/science/erkf.md, "Smoother").
+    d (N,) is −P λ before the segment. From sample to sample d ← F d − Q λ − d̂x, which is −P λ again without
+    using P (the forward form of the disturbance smoother: Koopman 1993; docs/science/erkf.md, "Smoother").
     """
     for k in range(len(step)):
         dx, Q = record.dx[k], record.Q[k]

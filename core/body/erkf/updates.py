@@ -1,7 +1,7 @@
 """Measurements of the ErKF: their rows in closed form, and the update by one block of three rows.
 
 A block is 0 = h(x) + noise with at most two IMUs. Its H is ±1 on three errors (position, velocity or bias)
-and a 3 × 3 matrix on δθ, so H P costs a few rows of P. Blocks are taken one after the other against the
+and a 3 × 3 matrix on δθ, so H P involves only a few rows of P. Blocks are processed sequentially against the
 accumulated correction dx, which is injected once per step: with diagonal noise that equals the paper's
 stacked update. Rows: Potter 2021 eq 28–35; V = L⁻¹ H P, P ← P − VᵀV: docs/science/erkf.md, "Corrections".
 """
@@ -49,11 +49,11 @@ def joint_rows(x, R, m, i, j, ri, rj, centre, place, H, y):  # type: ignore[no-u
 def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def]
     """Variance of the joint centre's second-order term, ½ σ⁴ |r_xy|² of both levers, in m².
 
-    σ² is the variance of the two sensors' relative heading: where that is off by ψ, a lever's end is off by
-    (1 − cos ψ) r that the rows do not know. Added to the centre's variance as in the second-order filter
-    (Jazwinski 1970 §9.3; Bar-Shalom 2001 §10.3.2) it keeps the first steps from fixing headings too early;
-    at the 2° and less of a walk it is below 0.3 mm. At most 1.5 |r_xy|², the mean square of (1 − cos ψ) r
-    over all headings.
+    σ² is the variance of the relative heading of the two sensors: with a heading error ψ the end of a lever
+    is displaced by (1 − cos ψ) r, which the linearised rows do not include. Added to the variance of the
+    centre as in the second-order filter (Jazwinski 1970 §9.3; Bar-Shalom 2001 §10.3.2) it prevents the first
+    steps from fixing headings too early; at the 2° or less of a walk it is below 0.3 mm. At most 1.5 |r_xy|²,
+    the mean square of (1 − cos ψ) r over all headings.
     """
     a, b = i * m + 6, j * m + 6
     var = 0.0
@@ -89,7 +89,7 @@ def tilt_rows(R, f, m, i, place, H, y):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-untyped-def]
-    """Heading of the axis t = R f; two empty rows make it a block of three. False when t is near vertical."""
+    """Heading of the axis t = R f; two empty rows complete a block of three. False if t is near vertical."""
     tx = R[0, 0] * forward[0] + R[0, 1] * forward[1] + R[0, 2] * forward[2]
     ty = R[1, 0] * forward[0] + R[1, 1] * forward[1] + R[1, 2] * forward[2]
     level = tx * tx + ty * ty
@@ -107,7 +107,7 @@ def heading_rows(R, forward, measured, m, i, place, H, y):  # type: ignore[no-un
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def complete_rows(P, first):  # type: ignore[no-untyped-def]
-    """Copy what is below the diagonal of P into its rows first … first + 2, so that they are whole."""
+    """Copy the lower triangle of P into its rows first … first + 2, to make them complete."""
     for q in range(3):
         for c in range(q):
             P[first + c, first + q] = P[first + q, first + c]
@@ -117,7 +117,7 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
-    """Write H (P − Σ VᵀV) of a block into V[taken], the sum over the blocks before it; U[a]: H V[a]ᵀ."""
+    """Write H (P − Σ VᵀV) of a block into V[taken], summed over the previous blocks; U[a]: H V[a]ᵀ."""
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     new = V[taken]
     h, g = H[0], H[1]
@@ -149,16 +149,16 @@ def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
-    """Take one block into dx, but not yet into P; False if S is not positive.
+    """Accumulate one block in dx, but not yet in P; False if S is not positive definite.
 
-    What the blocks before it did to P is taken off H P: H (P − Σ VᵀV). So P goes through the processor's
-    cache once per sample (`subtract_blocks`) and not once per block.
+    The effect of the previous blocks on P is subtracted from H P: H (P − Σ VᵀV). So P passes through the
+    processor's cache once per sample (`subtract_blocks`) and not once per block.
 
     Parameters
     ----------
-    P : before all blocks, the rows that H asks for whole (`complete_rows`). taken : blocks before this.
-    V (blocks, 3, as P) and E (9,) = (e, L) of this one are kept for the smoother.
-    U (> taken, 3, 3) : scratch. y (3,) becomes what is left of the block's own after dx.
+    P : before all blocks, with the rows used by H complete (`complete_rows`). taken : number of previous
+    blocks. V (blocks, 3, as P) and E (9,) = (e, L) of this one are kept for the smoother.
+    U (> taken, 3, 3) : scratch. y (3,) becomes the residual of the block after dx.
     """
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
     both, turns = b2 >= 0, place[TURNS] == 1
@@ -233,10 +233,10 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def subtract_blocks(P, V, blocks):  # type: ignore[no-untyped-def]
-    """P ← P − Σ VᵀV on and below the diagonal, four rows and two lines at a time; V (≥ blocks, 3, as P).
+    """P ← P − Σ VᵀV in the lower triangle, four rows and two cache lines at a time; V (≥ blocks, 3, as P).
 
-    A row is run through up to two whole lines of the cache; what is above the diagonal means nothing. P has
-    rows to spare (`memory_of`).
+    Each row is processed up to two whole cache lines; the upper triangle has arbitrary contents. P has spare
+    rows (`memory_of`).
     """
     last = P.shape[1] - STEP
     for r in range(0, P.shape[0], 4):

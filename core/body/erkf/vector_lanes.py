@@ -1,7 +1,8 @@
-"""`lanes` of eight numbers, built for LLVM directly, which splits eight into what a processor has.
+"""Vector variant of `lanes` with eight numbers, built directly for LLVM, which maps them to the processor's
+registers.
 
-It compiles in half the time of the same written in Python, but with names that neither Numba nor llvmlite
-promises to keep: only `lanes` imports it, and only with versions it was tested with.
+It compiles in half the time of the equivalent Python code, but uses undocumented names of Numba and llvmlite:
+it is imported only by `lanes`, and only with tested versions.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ _VECTOR: Final = ir.VectorType(ir.DoubleType(), STEP)
 
 
 class LanesType(types.Type):  # type: ignore[misc, unused-ignore]
-    """Eight float64, which add, subtract and multiply by place; a number before × is multiplied by each."""
+    """Eight float64 with elementwise addition, subtraction and multiplication; a scalar factor is
+    broadcast.
+    """
 
     def __init__(self) -> None:
         super().__init__(name="lanes")
@@ -38,7 +41,7 @@ class _LanesModel(models.PrimitiveModel):  # type: ignore[misc, unused-ignore]
 
 
 def _find(context: Any, builder: Any, kind: Any, args: Any) -> Any:
-    """Address of the line that begins at a row and column of an array, as `read_lanes` takes them."""
+    """Address of a row and column of an array, as used by `read_lanes`."""
     array = context.make_array(kind)(context, builder, args[0])
     place = cgutils.get_item_pointer(context, builder, kind, array, args[1:3], wraparound=False)
     return builder.bitcast(place, _VECTOR.as_pointer())
@@ -46,8 +49,9 @@ def _find(context: Any, builder: Any, kind: Any, args: Any) -> Any:
 
 @intrinsic
 def read_lanes(_: Any, array: Any, row: Any, column: Any) -> Any:
-    """Eight numbers of an array (rows, columns) from a place on; the reader sees to it that there are so
-    many."""
+    """Eight numbers of an array (rows, columns) from a position on; the caller must ensure that they
+    exist.
+    """
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.load(_find(context, builder, signature.args[0], args), align=8)
@@ -57,7 +61,7 @@ def read_lanes(_: Any, array: Any, row: Any, column: Any) -> Any:
 
 @intrinsic
 def write_lanes(_: Any, array: Any, row: Any, column: Any, lanes: Any) -> Any:
-    """The way back of `read_lanes`."""
+    """Inverse of `read_lanes`."""
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         builder.store(args[3], _find(context, builder, signature.args[0], args), align=8)
@@ -68,7 +72,7 @@ def write_lanes(_: Any, array: Any, row: Any, column: Any, lanes: Any) -> Any:
 
 @intrinsic
 def spread(_: Any, number: Any) -> Any:
-    """A number eight times."""
+    """Broadcast a number to eight lanes."""
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return _spread(builder, args[0])
@@ -84,7 +88,7 @@ def _spread(builder: Any, number: Any) -> Any:
 
 @intrinsic
 def read_columns(_: Any, array: Any, row: Any, column: Any) -> Any:
-    """Eight columns from a place on as `Lanes` of eight rows, of an array (rows, columns)."""
+    """Eight columns from a position on as `Lanes` of eight rows, of an array (rows, columns)."""
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         rows = [builder.load(place, align=8) for place in _find_rows(context, builder, signature, args)]
@@ -95,7 +99,7 @@ def read_columns(_: Any, array: Any, row: Any, column: Any) -> Any:
 
 @intrinsic
 def write_columns(_: Any, array: Any, row: Any, column: Any, columns: Any) -> Any:
-    """The way back of `read_columns`."""
+    """Inverse of `read_columns`."""
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         rows = _transpose(builder, cgutils.unpack_tuple(builder, args[3], STEP))
@@ -107,14 +111,14 @@ def write_columns(_: Any, array: Any, row: Any, column: Any, columns: Any) -> An
 
 
 def _find_rows(context: Any, builder: Any, signature: Any, args: Any) -> list[Any]:
-    """Addresses as `_find` gives them, of a row and the seven below it."""
+    """Addresses, as from `_find`, of a row and the next seven rows."""
     steps = (ir.Constant(args[1].type, k) for k in range(STEP))
     rows = [builder.add(args[1], step) for step in steps]
     return [_find(context, builder, signature.args[0], (args[0], row, args[2])) for row in rows]
 
 
 def _transpose(builder: Any, rows: Any) -> list[Any]:
-    """Eight `Lanes` as the rows of a matrix → its columns."""
+    """Transpose eight `Lanes`: rows of a matrix → its columns."""
     found = list(rows)
     mask = ir.VectorType(ir.IntType(32), STEP)
     for s in (1, 2, 4):
@@ -146,7 +150,7 @@ def mix(_: Any, M: Any, i: Any, x: Any, y: Any, z: Any) -> Any:
 
 
 def _operation(name: str) -> Any:
-    """An intrinsic of two `Lanes`, by the name of LLVM's operation."""
+    """An intrinsic for two `Lanes`, by the name of LLVM's operation."""
 
     @intrinsic
     def operate(_: Any, a: Any, b: Any) -> Any:

@@ -1,9 +1,9 @@
-"""Whether the sensors that L7S was given move as the feet and the pelvis of a walking person do.
+"""Plausibility checks of the L7S sensors: do they move like the feet and pelvis of a walking person?
 
-With two or three sensors no joint has two, so that nothing contradicts a wrong one by itself. What can be
-held against it is how people walk: feet take turns, stay under their hips, the outer foot goes further in a
-turn, and the pelvis falls away from the foot it stands on. All figures were looked at on the simulated walks
-of core/simulate and on neura_walk, right and with sensors exchanged; limits are in health.py.
+With two or three sensors no joint has two of them, so a wrong sensor contradicts no other one. It can only be
+compared with how people walk: feet alternate, stay below their hips, the outer foot travels further in a
+turn, and the pelvis accelerates away from the supporting foot. All values were examined on the simulated
+walks of core/simulate and on neura_walk, with correct and with swapped sensors; limits are in health.py.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ LEAST_TURN: Final = np.radians(60.0)
 
 @dataclass(frozen=True, eq=False)
 class SeenWalk:
-    """What the checks look at: of a block of samples, or of a take.
+    """Input of the checks: for a block of samples, or a recording.
 
     Parameters
     ----------
-    step : (n, 2) foot still, left and right. forward : (n, 2) where both feet point, level, of any length.
-    feet : (n, 2, 2) level places of the filter, m. pelvis : (n, 3) acceleration upwards and to its left,
-    m/s², and how far it tilts forward, rad; None without its sensor.
+    step : (n, 2) foot still, left and right. forward : (n, 2) horizontal direction of both feet, of any
+        length. feet : (n, 2, 2) horizontal positions of the filter, m. pelvis : (n, 3) acceleration upwards
+        and to its left, m/s², and forward tilt, rad; None without its sensor.
     """
 
     step: Bools
@@ -61,14 +61,14 @@ class SeenWalk:
 
     @classmethod
     def of(cls, inputs: L7sInputs, track: L7sTrack) -> SeenWalk:
-        """Of a block and what the filter makes of it."""
+        """From a block and the filter's output."""
         forward = inputs.R[:, 1, :2, 2] + inputs.R[:, 2, :2, 2]
         pelvis = _see_pelvis(inputs) if inputs.worn == "3I" else None
         return cls(inputs.step, forward, track.p[:, 1:, :2].copy(), pelvis)
 
     @classmethod
     def make_room(cls, samples: int, *, pelvis: bool) -> SeenWalk:
-        """Of a take whose blocks are still to be put in."""
+        """Allocate for a recording whose blocks are filled in later."""
         return cls(
             np.empty((samples, 2), np.bool_),
             np.empty((samples, 2)),
@@ -77,24 +77,25 @@ class SeenWalk:
         )
 
     def put(self, at: slice, block: SeenWalk) -> None:
-        """Write a block to its samples."""
+        """Store a block at its samples."""
         self.step[at], self.forward[at], self.feet[at] = block.step, block.forward, block.feet
         if self.pelvis is not None:
             self.pelvis[at] = block.pelvis
 
 
 def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str, float]:
-    """Measured quantities by name; one that the take does not show is not there.
+    """Quantities by name; those that cannot be determined from the recording are absent.
 
     Returns
     -------
-    `out_of_place_share` : of the time in motion in which the feet are not side by side under the hips.
-    `phase_off` : distance of the other foot's rest from the middle of a stride, in strides, median.
-    2I: `inner_foot_m`, way of the inner foot minus that of the outer per radian of turn, m: minus the
-    distance of the feet, and positive when the sides are exchanged; `turned_rad`, what that rests on.
-    3I: `toward_foot_mps2`, acceleration of the pelvis toward the foot that stands alone, negative in walking
-    (an inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving; `pelvis_rise_m`,
-    most that its height changes within some seconds, which L7S takes to be constant.
+    `out_of_place_share` : fraction of the time in motion in which the feet are not side by side below the
+        hips.
+    `phase_off` : distance of the other foot's rest from the middle of a stride, in strides, median. 2I:
+    `inner_foot_m`, path of the inner foot minus that of the outer per radian of turn, m: minus the distance
+    of the feet, positive if the sides are swapped; `turned_rad`, the total turn it is based on. 3I:
+    `toward_foot_mps2`, acceleration of the pelvis toward the foot in single support, negative in walking (an
+    inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving; `pelvis_rise_m`, largest
+    change of its height within a few seconds, which L7S assumes constant.
     """
     found: dict[str, float] = {}
     moving = np.asarray(~seen.step.all(axis=1))
@@ -117,7 +118,7 @@ def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str,
 
 
 def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment, float]:
-    """Longest loss of each sensor in s; `valid` (T,) of each."""
+    """Longest data loss of each sensor in s; `valid` (T,) of each."""
     return {s: longest_run_s(~ok, rate_hz) for s, ok in valid.items()}
 
 
@@ -133,7 +134,7 @@ def _rests(step: Bools, rate_hz: float) -> np.ndarray:
 
 
 def _phases(own: np.ndarray, other: np.ndarray, rate_hz: float) -> list[float]:
-    """Where in each stride of a foot the other one rests, 0 to 1; 0 where it does not."""
+    """Phase of the other foot's rest in each stride of a foot, 0 to 1; 0 without one."""
     phases = []
     for a, b in pairwise(own):
         if STRIDE_S[0] * rate_hz <= b - a <= STRIDE_S[1] * rate_hz:
@@ -144,7 +145,7 @@ def _phases(own: np.ndarray, other: np.ndarray, rate_hz: float) -> list[float]:
 
 
 def _turns(rests: list[np.ndarray], heading: Floats, feet: Floats, longest: float) -> dict[str, float]:
-    """How much further the inner foot goes than the outer: two feet at a distance on a turning body."""
+    """Path difference between inner and outer foot: two feet at a distance on a turning body."""
     left, right = rests
     if len(left) < 2 or len(right) < 2:
         return {}
@@ -163,7 +164,7 @@ def _turns(rests: list[np.ndarray], heading: Floats, feet: Floats, longest: floa
 
 
 def _way(rests: np.ndarray, heading: Floats, p: Floats) -> Floats:
-    """Way forward (rests,) in m that a foot has gone from its first rest on."""
+    """Forward distance (rests,) in m travelled by a foot since its first rest."""
     middle = 0.5 * (heading[rests[:-1]] + heading[rests[1:]])
     along = np.stack((np.cos(middle), np.sin(middle)), axis=1)
     return np.concatenate(([0.0], np.cumsum(np.sum(np.diff(p[rests], axis=0) * along, axis=1))))
@@ -189,7 +190,7 @@ def _pelvis(pelvis: Floats, step: Bools, moving: Bools, rate_hz: float) -> dict[
 
 
 def _rise(vertical: Floats, rate_hz: float) -> float:
-    """Largest change of height within `RISE_S`, by integrating what is quicker than `SLOWEST_HZ` twice."""
+    """Largest change of height within `RISE_S`, by double integration of components above `SLOWEST_HZ`."""
     n = len(vertical)
     f = np.fft.rfftfreq(2 * n, 1.0 / rate_hz)[1:]
     gain = -1.0 / (2.0 * np.pi * f) ** 2 * f**4 / (f**4 + SLOWEST_HZ**4)

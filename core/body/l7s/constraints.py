@@ -1,4 +1,6 @@
-"""Projection onto the legs: hinged knees and ankles, and no leg longer than thigh and shank (eq 28–39)."""
+"""Projection onto the leg constraints: hinged knees and ankles, and no leg longer than thigh and shank (eq
+28–39).
+"""
 
 from __future__ import annotations
 
@@ -18,10 +20,11 @@ MOST: Final = 4
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def constraint_rows(R, p, leg, half_hip, half_foot, leg_length, C, d, first):  # type: ignore[no-untyped-def]
-    """Write the rows of one leg into C (·, 12), what is missing into d, from row `first` on; return how many.
+    """Write the constraint rows of one leg into C (·, 12), residuals into d, from row `first` on; return
+    their number.
 
-    Columns: ρ and φ of the pelvis, then of the foot. Hinge: the ankle-to-hip vector τ is across the foot's
-    y axis (eq 34). Length: |τ| ≤ L (eq 37).
+    Columns: ρ and φ of the pelvis, then of the foot. Hinge: the ankle-to-hip vector τ is perpendicular to the
+    foot's y axis (eq 34). Length: |τ| ≤ L (eq 37).
     """
     f = 1 + leg
     side = half_hip if leg == 0 else -half_hip
@@ -77,16 +80,16 @@ def _solve(S, d, rows):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def make_scratch():  # type: ignore[no-untyped-def]
-    """What `project` and `project_places` work with."""
+    """Work arrays of `project` and `project_places`."""
     S, d = np.empty((MOST, MOST)), np.empty(MOST)
     return np.empty((MOST, 12)), np.empty((MOST, WIDTH)), S, d, np.empty((3, 3, 3))
 
 
 @inner_njit()
 def project(R, p, v, P, lengths, dx, scratch):  # type: ignore[no-untyped-def]
-    """One projection ν = P Cᵀ (C P Cᵀ)⁻¹ d, injected; P stays (eq 28–31). False if C P Cᵀ is singular.
+    """One projection ν = P Cᵀ (C P Cᵀ)⁻¹ d, injected; P is unchanged (eq 28–31). False if C P Cᵀ is singular.
 
-    lengths : half hip width, half foot, leg. dx : (28,) as of `apply_rows`, written.
+    lengths : half hip width, half foot, leg. dx : (28,) as in `apply_rows`, written.
     """
     C, PC, S, d, work = scratch
     n = len(dx)
@@ -123,7 +126,7 @@ def project(R, p, v, P, lengths, dx, scratch):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def project_places(R, p, spread, lengths, dx, scratch):  # type: ignore[no-untyped-def]
-    """The same with variances `spread` (12,) of a pelvis' ρ and φ and a foot's, nothing else of P."""
+    """The same with variances `spread` (12,) of ρ and φ of pelvis and foot, instead of P."""
     C, PC, S, d, work = scratch
     left = constraint_rows(R, p, 0, lengths[0], lengths[1], lengths[2], C, d, 0)
     rows = left + constraint_rows(R, p, 1, lengths[0], lengths[1], lengths[2], C, d, left)

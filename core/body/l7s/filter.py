@@ -2,19 +2,18 @@
 
 Sy, Lovell, Redmond 2021, IEEE Sensors Journal (docs/science/l7s.md): a constrained Kalman filter on SE(3)³ ×
 R⁹. The state is the pose and velocity of pelvis and feet; thighs and shanks follow from hinged knees and
-ankles. What we do otherwise than the paper prints (evidence:
-docs/science/l7s.md, "Departures from the paper"):
+ankles. Differences from the printed paper (evidence: docs/science/l7s.md, "Departures from the paper"):
 
-- eq 18: the feet's blocks of the mid-pelvis row carry −½, the minus is lost in print.
-- eq 32: the ankle lies at −d/2 on the foot's z axis, which points to the toe; print has +.
-- eq 20: σ there is a variance; it jumps to 10 m² at toe-off and decays from the last flagged sample on, not
-  below 1e-4 m², which is also its value while a step is flagged (missing in print).
+- eq 18: the feet's blocks of the mid-pelvis row are −½; the minus is missing in print.
+- eq 32: the ankle is at −d/2 on the foot's z axis, which points to the toe; the paper has +.
+- eq 20: σ is a variance; it jumps to 10 m² at toe-off and decays from the last flagged sample on, not below
+  1e-4 m², which is also its value while a step is flagged (missing in print).
 - eq 6: `adjoint="printed"` keeps the paper's Ad(+Ω) with the C of the authors' program; the derivation gives
-  Ad(−Ω) and with the full C no term at all: `"exact"`. Only the printed form holds feet together whose
-  headings disagree by more than some 3°, so it is the default.
-- eq 7: 𝒢 puts acceleration noise into the position as if that were in world axes; with this local
-  error it is in body axes, so its covariance with velocity is turned by Rᵀ. Otherwise the result would depend
-  on which way the person walks in the world.
+  Ad(−Ω) and with the full C no term at all: `"exact"`. Only the printed form is stable if the headings of the
+  feet disagree by more than about 3°, so it is the default.
+- eq 7: 𝒢 adds acceleration noise to the position as if that were in world axes; with this local error it is
+  in body axes, so its covariance with velocity is rotated by Rᵀ. Otherwise the result would depend on the
+  walking direction in W.
 - two projections onto the constraints instead of one.
 """
 
@@ -28,6 +27,7 @@ import numpy as np
 from sagittal.core.body.l7s.legs import HIP_SIDE, LEGS, LegModel
 from sagittal.core.errors import EstimationError, ParameterError
 from sagittal.core.frames import FOOT, Bools, Floats
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, to_matrix, wrap_angle
 
 Worn = Literal["3I", "2I"]
@@ -51,9 +51,10 @@ class L7sParams:
     ----------
     adjoint : see the module. projections : onto the constraints per step (paper: 1).
     acceleration : m²/s⁴. orientation_step : rad² added per step, σ_ω²Δt² = 1e7 · 1e-4 at any rate, so that
-        the orientation is taken anew from the orientation filter each step. orientation : rad².
+        the orientation is effectively replaced by that of the orientation filter at each step. orientation :
+        rad².
     mid_pelvis, pelvis_height : m². yaw : rad² (2I only). zero_velocity : m²/s².
-    foot_swing : m² at toe-off; foot_floor : m² while a step is flagged and at least; decay_s : λ of eq 20.
+    foot_swing : m² at toe-off; foot_floor : m² while a step is flagged, and minimum; decay_s : λ of eq 20.
     start : every diagonal entry of P at the first sample.
     """
 
@@ -74,23 +75,29 @@ class L7sParams:
     def __post_init__(self) -> None:
         if self.adjoint not in ("printed", "exact"):
             raise ParameterError(
-                "adjoint_unknown", f"adjoint is '{self.adjoint}', expected printed or exact."
+                "adjoint_unknown",
+                Message("adjoint is '{adjoint}', expected printed or exact.", adjoint=self.adjoint),
             )
         if not 0 <= self.projections <= 10:
-            raise ParameterError("projections_range", f"{self.projections} projections are outside 0 to 10.")
+            raise ParameterError(
+                "projections_range",
+                Message("{projections} projections are outside 0 to 10.", projections=self.projections),
+            )
         for name, value in vars(self).items():
             if isinstance(value, float) and not (np.isfinite(value) and value > 0.0):
-                raise ParameterError("variance_range", f"{name} = {value:g} is not above 0.")
+                raise ParameterError(
+                    "variance_range", Message("{name} = {value:g} is not above 0.", name=name, value=value)
+                )
 
 
 @dataclass(frozen=True, eq=False)
 class L7sState:
-    """What the filter carries from one sample to the next.
+    """Filter state carried from one sample to the next.
 
     Parameters
     ----------
     R : (3, 3, 3) of BODIES in Sy's frames. p, v : (3, 3) m, m/s, in W. P : (27, 27).
-    since : (2,) samples since the last flagged step, left and right.
+    since : (2,) number of samples since the last flagged step, left and right.
     """
 
     R: Floats
@@ -106,7 +113,7 @@ class L7sInputs:
 
     Parameters
     ----------
-    R : (n, 3, 3, 3) measured orientations of BODIES in Sy's frames (2I: the pelvis's are not read).
+    R : (n, 3, 3, 3) measured orientations of BODIES in Sy's frames (2I: those of the pelvis are ignored).
     acc : (n, 3, 3) accelerations in W without gravity, m/s². step : (n, 2) foot still, left and right.
     """
 
@@ -116,7 +123,7 @@ class L7sInputs:
     worn: Worn
 
     def part(self, which: slice) -> L7sInputs:
-        """Some of the samples."""
+        """A slice of the samples."""
         return L7sInputs(self.R[which], self.acc[which], self.step[which], self.worn)
 
 
@@ -130,20 +137,21 @@ class L7sTrack:
     variance: Floats
 
     def part(self, which: slice) -> L7sTrack:
-        """Some of the samples."""
+        """A slice of the samples."""
         return L7sTrack(self.R[which], self.p[which], self.v[which], self.variance[which])
 
 
 def filter_block(
     state: L7sState, inputs: L7sInputs, model: LegModel, rate_hz: float, params: L7sParams | None = None
 ) -> tuple[L7sTrack, L7sState]:
-    """Advance the filter over a block: predict, one stacked update, projections (Sy 2021 eq 3–39).
+    """Process a block: predict, one stacked update, projections (Sy 2021 eq 3–39).
 
-    One run over n samples equals any split of it into blocks, bit for bit.
+    Results are bit-identical for any division into blocks.
 
     Raises
     ------
-    EstimationError `bad_signal` when an input is not finite, `l7s_diverged` when a constraint cannot be met.
+    EstimationError `bad_signal` if an input is not finite, `l7s_diverged` if a constraint cannot be
+    satisfied.
     """
     from sagittal.core.body.l7s import kernel
     from sagittal.core.body.l7s.updates import WIDTH
@@ -156,14 +164,22 @@ def filter_block(
     if R.shape != (n, 3, 3, 3) or acc.shape != (n, 3, 3) or step.shape != (n, 2):
         raise ParameterError(
             "bad_shape",
-            f"L7S inputs have shapes {R.shape}, {acc.shape}, {step.shape}; expected "
-            "(n, 3, 3, 3), (n, 3, 3), (n, 2).",
+            Message(
+                "L7S inputs have shapes {shape}, {shape2}, {shape3}; expected (n, 3, 3, 3), (n, 3, "
+                "3), (n, 2).",
+                shape=R.shape,
+                shape2=acc.shape,
+                shape3=step.shape,
+            ),
         )
     bad = ~(np.isfinite(R).all(axis=(1, 2, 3)) & np.isfinite(acc).all(axis=(1, 2)))
     if bad.any():
         raise EstimationError(
             "bad_signal",
-            f"Sample {int(np.argmax(bad))} of the block is not a number; mark it invalid or interpolate it.",
+            Message(
+                "Sample {int} of the block is not a number; mark it invalid or interpolate it.",
+                int=int(np.argmax(bad)),
+            ),
         )
     now = L7sState(*(np.array(x, np.float64, order="C") for x in vars(state).values()))
     track = L7sTrack(np.empty((n, 3, 3, 3)), np.empty((n, 3, 3)), np.empty((n, 3, 3)), np.empty((n, SIZE)))
@@ -185,20 +201,23 @@ def filter_block(
     if failed >= 0 or not all(np.isfinite(x).all() for x in vars(now).values()):
         raise EstimationError(
             "l7s_diverged",
-            f"The leg constraints cannot be met at sample {max(int(failed), 0)} of the block; check which "
-            "foot each sensor is on and the body height.",
+            Message(
+                "The leg constraints cannot be met at sample {max} of the block; check which foot "
+                "each sensor is on and the body height.",
+                max=max(int(failed), 0),
+            ),
         )
     return track, now
 
 
 def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None = None) -> L7sState:
-    """The state at the first sample: standing straight, ankles under the hips, pelvis over the origin of W.
+    """The state at the first sample: upright standing, ankles below the hips, pelvis above the origin of W.
 
     Sy 2021 §III-A takes the start from Vicon; here it is the body model at the measured headings.
 
     Raises
     ------
-    EstimationError `headings_apart` when the worn sensors face more than 90° apart.
+    EstimationError `headings_apart` if the headings of the sensors differ by more than 90°.
     """
     R = np.array(inputs.R[0], np.float64)
     forward = R[1:, :2, 2].sum(axis=0)
@@ -216,8 +235,13 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
             other = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(
                 "headings_apart",
-                f"The {side} foot faces {np.degrees(apart):.0f}° away from the {other} at the start: more "
-                "than a person can. Check that no sensor is worn backwards and calibrate again.",
+                Message(
+                    "The {side} foot faces {apart:.0f}° away from the {other} at the start: more than a "
+                    "person can. Check that no sensor is worn backwards and calibrate again.",
+                    side=side,
+                    apart=np.degrees(apart),
+                    other=other,
+                ),
                 sensor=FOOT[side],
             )
     p = np.zeros((3, 3))

@@ -1,11 +1,11 @@
-"""Where the sensor of a foot sits, from how the foot rolls over its ball.
+"""Position of the sensor on a foot, estimated from the rolling of the foot over its ball.
 
-L7S takes what a foot's sensor feels for the motion of the foot's middle. On a shoe the sensor sits further
-in front: two feet with motion capture had it 4 and 5 cm ahead of the middle. With the heel up by 60° the
-ankle then is 3 to 4 cm higher than L7S takes it for, and the knee bent by 10° more.
+L7S assumes that the foot sensor measures the motion of the middle of the foot. On a shoe the sensor is
+further forward: for two feet with motion capture it was 4 and 5 cm in front of the middle. With the heel
+raised by 60° the ankle is then 3 to 4 cm higher than in L7S, and the knee is flexed by 10° more.
 
-At push-off the heel rises while the ball stays on the floor, so there the sensor moves on a circle about the
-ball, and its way tells how far it is from it (docs/science/l7s.md, "Where the sensor of a foot sits").
+At push-off the heel rises while the ball stays on the floor, so the sensor moves on a circle about the ball,
+and its path determines the distance between them (docs/science/l7s.md, "Where the sensor of a foot sits").
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ ON_FOOT_M: Final = 0.12
 
 
 def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegModel, rate_hz: float) -> Floats:
-    """Vector (2, 3) from each foot's sensor to the foot's middle, in Sy's axes of the foot, m.
+    """Vector (2, 3) from each foot's sensor to the middle of the foot, in Sy's axes of the foot, m.
 
-    Zero, what the paper takes, where too few strides show it. Across the foot always zero: it rolls about
-    that axis.
+    Zero, as assumed in the paper, with too few suitable strides. The medio-lateral component is always zero:
+    the foot rolls about that axis.
 
     Parameters
     ----------
-    valid : (n, 3) sensor of BODIES there.
+    valid : (n, 3) sensor of BODIES available.
     """
     found = np.zeros((len(LEGS), 3))
     for leg in range(len(LEGS)):
@@ -83,14 +83,16 @@ def _swings(step: Bools, valid: Bools, rate_hz: float) -> NDArray[np.int64]:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _find_balls(R, acc, swings, dt, balls):  # type: ignore[no-untyped-def]
-    """Write the ball (s, 2) from the sensor along the foot's x (down) and z (forward), m, NaN where none.
+    """Write the position of the ball (s, 2) relative to the sensor along the foot's x (down) and z (forward),
+    m, or NaN.
 
-    From (R₀ − R) b = p − p₀ by least squares over the push-off, p from the velocity less its linear drift.
+    From (R₀ − R) b = p − p₀ by least squares over the push-off, p from the velocity after removal of its
+    linear drift.
 
     Parameters
     ----------
-    R : (n, 3, 3) and acc : (n, 3) of a foot. swings : (s, 2) from rest to rest; one in which the heel stays
-    has no ball.
+    R : (n, 3, 3) and acc : (n, 3) of a foot. swings : (s, 2) from rest to rest; NaN for swings without heel
+        rise.
     """
     for s in range(len(swings)):
         first, last = swings[s]
@@ -119,7 +121,7 @@ def _find_balls(R, acc, swings, dt, balls):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _find_push_off(R, first, last):  # type: ignore[no-untyped-def]
-    """The last sample of a swing at which the ball is on the floor; −1 where the heel does not rise."""
+    """The last sample of a swing with the ball on the floor; −1 if the heel does not rise."""
     start = _find_rise(R, first)
     highest, top = first, 0.0
     for k in range(first, last):
@@ -144,5 +146,5 @@ def _find_push_off(R, first, last):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _find_rise(R, k):  # type: ignore[no-untyped-def]
-    """How steep the sole is, rad."""
+    """Inclination of the sole, rad."""
     return -asin(min(max(R[k, 2, 2], -1.0), 1.0))

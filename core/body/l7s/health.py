@@ -1,4 +1,4 @@
-"""What an L7S run says about itself (docs/reference/estimators.md, "Health")."""
+"""Health of an L7S run (docs/reference/estimators.md, "Health")."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sagittal.core.body.health import LONGEST_MOVING_S, HealthFinding, longest_r
 from sagittal.core.body.poses import Poses
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Protocol, Segment
+from sagittal.core.message import Message
 
 CONSTRAINT_MM: Final = (1.0, 10.0)
 """What constraints leave after projection: below .01 with two, 10 accepted with one
@@ -59,7 +60,7 @@ LEVEL: Final[tuple[Protocol, ...]] = ("squat", "activity", "tug")
 
 
 def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
-    """Judge a run of `l7s_poses` by its own quantities."""
+    """Judge a run of `l7s_poses` by its own diagnostics."""
     d = cast("dict[str, Any]", poses.diagnostics)
     found = []
     for side in d["hinge_m"]:
@@ -174,23 +175,24 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def list_health_notices(findings: Sequence[HealthFinding]) -> tuple[Notice, ...]:
-    """What of it a person must be told; the worst of each kind."""
+    """Notices for the user on the health of the run; only the worst of each kind."""
     notices = {}
     for f in sorted((f for f in findings if f.verdict != "good"), key=lambda f: f.value):
         if f.name in TOLD:
             code, words = TOLD[f.name]
             sensor = f.of if f.name == "gap_s" else None
-            message = words.format(of=f.of, value=f.value, warn=f.warn)
+            message = Message(words, of=f.of, value=f.value, warn=f.warn)
             notices[code] = Notice(code, message, sensor=sensor)
     return tuple(notices.values())
 
 
 def l7s_notices(protocol: Protocol) -> tuple[Notice, ...]:
-    """What must be said about a take that this estimator is not made for."""
+    """Notice for recordings of protocols that L7S is not designed for."""
     if protocol not in LEVEL:
         return ()
-    message = (
-        f"L7S takes the pelvis to stay at its standing height; in '{protocol}' it does not. Read its angles "
-        "and positions for walking parts only, or wear seven sensors."
+    message = Message(
+        "L7S takes the pelvis to stay at its standing height; in '{protocol}' it does not. "
+        "Read its angles and positions for walking parts only, or wear seven sensors.",
+        protocol=protocol,
     )
     return (Notice("pelvis_height_assumed", message),)

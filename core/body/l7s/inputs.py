@@ -1,6 +1,6 @@
-"""What L7S takes of the sensors: accelerations free of gravity, orientations in Sy's frames, what is known.
+"""Inputs of L7S: gravity-free accelerations, orientations in Sy's frames, sample validity.
 
-Every kernel goes on from one block of samples to the next, so that a file is one block and a stream is many.
+Every kernel carries its state across blocks, so that a file is one block and a stream is many.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from sagittal.core.body.l7s.legs import BODIES, LEGS, LegModel
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, GRAVITY, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation.compiled import multiply3, to_matrix, transform
 from sagittal.core.signals.calibrated import CalibratedRecording, SegmentCalibration
 from sagittal.core.signals.held_samples import SampleSeries
@@ -24,12 +25,12 @@ from sagittal.core.signals.recording import SensorSignals
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _write_free_acceleration(acc, valid, q, R, excess, out):  # type: ignore[no-untyped-def]
-    """Write accelerations (T, 3) in W without gravity of one sensor, 0 where it is lost.
+    """Write gravity-free accelerations (T, 3) of one sensor in W, 0 during data loss.
 
     Parameters
     ----------
     acc : (T, 3) as measured. valid : (T,). q : (T, 4) segment to W. R : (3, 3) sensor to segment. excess :
-    of the norm at rest over G, m/s².
+    norm at rest minus G, m/s².
     """
     force, turned = np.empty(3), np.empty((3, 3))
     for k in range(acc.shape[0]):
@@ -45,7 +46,7 @@ def _write_free_acceleration(acc, valid, q, R, excess, out):  # type: ignore[no-
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _write_sy_frames(q, back, out):  # type: ignore[no-untyped-def]
-    """Write matrices (T, 3, 3) in Sy's frames of segments q (T, 4) in ours; `back` (3, 3) is Mᵀ."""
+    """Write matrices (T, 3, 3) in Sy's frames for segments q (T, 4) in ours; `back` (3, 3) is Mᵀ."""
     R = np.empty((3, 3))
     for k in range(q.shape[0]):
         to_matrix(q[k], R)
@@ -71,20 +72,21 @@ def _mark_known(valid, step, lost, known):  # type: ignore[no-untyped-def]
 
 
 class KnownSamples:
-    """Samples at which every worn sensor is there and no foot is on its way after a loss.
+    """Samples with all sensors available and no foot still in swing after a data loss.
 
-    Any division into blocks gives the same.
+    Independent of the division into blocks.
     """
 
     def __init__(self) -> None:
         self._lost = np.zeros(len(LEGS), np.bool_)
 
     def push(self, valid: Sequence[Bools], step: Bools) -> Bools:
-        """The next samples (T,).
+        """Process the next samples (T,).
 
         Parameters
         ----------
-        valid : (T,) of each worn body in the order of `BODIES`. step : (T, 2) left and right foot still.
+        valid : (T,) of each instrumented body in the order of `BODIES`. step : (T, 2) left and right foot
+            still.
         """
         known = np.empty(len(step), np.bool_)
         _mark_known(np.stack(valid, axis=1), np.ascontiguousarray(step, np.bool_), self._lost, known)
@@ -92,10 +94,10 @@ class KnownSamples:
 
 
 def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibration) -> Floats:
-    """Accelerations (T, 3) of one sensor in W without gravity, m/s²; zero while lost.
+    """Gravity-free accelerations (T, 3) of one sensor in W, m/s²; zero during data loss.
 
-    What the accelerometer's norm at rest differs from G is taken off as a bias along the segment's axis that
-    is vertical at rest, not as a scale (docs/science/calibration.md, "Standing").
+    The difference of the accelerometer's norm at rest from G is subtracted as a bias along the segment axis
+    that is vertical at rest, not as a scale factor (docs/science/calibration.md, "Standing").
 
     Parameters
     ----------
@@ -114,7 +116,9 @@ def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibra
 
 
 def compile_gravity_kernel() -> None:
-    """Compile what `remove_gravity` calls or load it, so that the first take does not wait for it."""
+    """Compile the kernel of `remove_gravity` or load it from the cache, so that the first recording is not
+    delayed.
+    """
     mounted = SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0)
     valid = np.ones(1, np.bool_)
     valid.setflags(write=False)  # as that of a take
@@ -123,7 +127,7 @@ def compile_gravity_kernel() -> None:
 
 @dataclass(frozen=True, eq=False)
 class FreeAcceleration:
-    """Acceleration of one sensor as `remove_gravity`, of the part that is asked for.
+    """Acceleration of one sensor as from `remove_gravity`, computed for the requested part only.
 
     Parameters
     ----------
@@ -143,7 +147,7 @@ class FreeAcceleration:
 def free_acceleration(
     calibrated: CalibratedRecording, orientations: Orientations
 ) -> dict[Segment, FreeAcceleration]:
-    """Accelerations of all sensors with an orientation."""
+    """Gravity-free accelerations of all sensors with an orientation."""
     mounted, sensors = calibrated.calibration.segments, calibrated.recording.sensors
     return {s: FreeAcceleration(sensors[s], q, mounted[s]) for s, q in orientations.q.items()}
 
@@ -155,7 +159,8 @@ def arrange_inputs(
     model: LegModel,
     worn: Worn,
 ) -> L7sInputs:
-    """Bring orientations (T, 4), accelerations (T, 3) of the worn bodies into the filter's order and frames.
+    """Convert orientations (T, 4) and accelerations (T, 3) of the instrumented bodies to the filter's order
+    and frames.
 
     Parameters
     ----------
@@ -181,7 +186,7 @@ def bodies_of(worn: Worn) -> tuple[Segment, ...]:
 
 @dataclass(frozen=True, eq=False)
 class L7sTake:
-    """The filter's inputs of a take of which only parts are ever laid out: a sample of them has 290 bytes.
+    """The filter inputs of a recording, expanded only in parts: they take 290 bytes per sample.
 
     Parameters
     ----------
@@ -195,7 +200,7 @@ class L7sTake:
     worn: Worn
 
     def part(self, which: slice) -> L7sInputs:
-        """Some of the samples."""
+        """A slice of the samples."""
         needed = bodies_of(self.worn)
         return arrange_inputs(
             {s: self.q[s][which] for s in needed},
@@ -213,25 +218,30 @@ def take_of(
     model: LegModel,
     worn: Worn,
 ) -> L7sTake:
-    """The filter's inputs of a take, part by part.
+    """The filter inputs of a recording, accessible in parts.
 
     Raises
     ------
-    EstimationError `sensor_missing` when a worn body has no orientation, acceleration or steps.
+    EstimationError `sensor_missing` if an instrumented body has no orientation, acceleration or steps.
     """
     needed = bodies_of(worn)
     for segment in needed:
         if segment not in orientations.q or segment not in acceleration:
             raise EstimationError(
                 "sensor_missing",
-                f"L7S-{worn} needs {', '.join(needed)}; nothing of {segment}. Wear or map a sensor there.",
+                Message(
+                    "L7S-{worn} needs {needed}; nothing of {segment}. Wear or map a sensor there.",
+                    worn=worn,
+                    needed=", ".join(needed),
+                    segment=segment,
+                ),
                 sensor=segment,
             )
     for side in LEGS:
         if side not in steps:
             raise EstimationError(
                 "sensor_missing",
-                f"L7S needs to know when the {side} foot is still; give its step flags.",
+                Message("L7S needs to know when the {side} foot is still; give its step flags.", side=side),
                 sensor=FOOT[side],
             )
     step = np.stack([steps[side] for side in LEGS], axis=1)

@@ -13,7 +13,7 @@ from sagittal.core.signals.inner import UNCOUNTED, inner_njit
 
 @inner_njit(**UNCOUNTED)
 def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed, turned, factors, n):  # type: ignore[no-untyped-def]
-    """Move the mean by eq 3–4 with ω = 0 and P by eq 5 (docs/science/l7s.md, "Prediction").
+    """Propagate the mean by eq 3–4 with ω = 0 and P by eq 5 (docs/science/l7s.md, "Prediction").
 
     turned : (3, 3) scratch for the three Ω; factors : (3, 3, 6) for the rows ρ of F − 1.
     n : 28, unknown to the compiler (`apply_rows`).
@@ -60,7 +60,7 @@ def predict(R, p, v, P, acc, dt, q_acc, q_turn, printed, turned, factors, n):  #
 
 @inner_njit(**UNCOUNTED)
 def _add_rows(P, factors, n):  # type: ignore[no-untyped-def]
-    """P ← F P; F differs from 1 in the rows ρ and reads of ν and φ."""
+    """P ← F P; F differs from 1 in the rows ρ and involves ν and φ."""
     for b in range(3):
         pose, nu = P[WIDTH * 6 * b :], P[WIDTH * (VELOCITY + 3 * b) :]
         for i in range(3):
@@ -76,7 +76,7 @@ def _add_rows(P, factors, n):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _add_columns(P, factors):  # type: ignore[no-untyped-def]
-    """P ← P Fᵀ of F times a symmetric matrix: the result is symmetric, so that most of it is copied."""
+    """P ← P Fᵀ of F times a symmetric matrix: the result is symmetric, so most of it is copied."""
     for b in range(3):
         phi, nu = 6 * b + 3, VELOCITY + 3 * b
         for i in range(3):
@@ -103,10 +103,10 @@ def _relative(a, b, out):  # type: ignore[no-untyped-def]
 
 @inner_njit(**UNCOUNTED)
 def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):  # type: ignore[no-untyped-def]
-    """Write three rows of the measurement into `form`; return how many triples of ε they read.
+    """Write three rows of the measurement into `form`; return the number of triples of ε they involve.
 
-    group : 0 to 2 orientation of a body, 3 and 4 zero velocity of a foot, 5 mid-pelvis over the feet and its
-    height, 6 heights of the feet, 7 the pelvis' orientation from the feet. turned : (3, 3) scratch.
+    group : 0 to 2 orientation of a body, 3 and 4 zero velocity of a foot, 5 mid-pelvis above the feet and its
+    height, 6 heights of the feet, 7 the pelvis orientation from the feet. turned : (3, 3) scratch.
     """
     at, H, left, variance, _ = form
     if group == 5:
@@ -168,7 +168,7 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
 def apply_measurement(  # type: ignore[no-untyped-def]
     R, p, v, P, measured, three, step, z_variance, heights, r, dx, form, work
 ):
-    """The stacked update: leaves the correction in dx and injects it (docs/science/l7s.md, "Measurements").
+    """The stacked update: writes the correction to dx and injects it (docs/science/l7s.md, "Measurements").
 
     heights : pelvis, foot. r : variances (orientation, mid-pelvis, pelvis z, yaw, zero velocity). form : of
     `make_form`. work : (3, 3, 3) scratch.
@@ -188,11 +188,11 @@ def run_l7s_kernel(  # type: ignore[no-untyped-def]
     R, p, v, P, dx, since, measured, acc, step, three, dt, lengths, heights, r, swing, q, printed,
     projections, R_out, p_out, v_out, variance_out,
 ):  # fmt: skip
-    """Advance the state in place over a block; return the index of the sample that failed, −1 if none did.
+    """Advance the state in place over a block; return the index of the sample that failed, or −1.
 
-    P : (784,) as in updates.py. dx : (28,) scratch: made here, its length would be known (`apply_rows`).
-    lengths : half hip width, half foot, leg. swing : m² at toe-off, least m², λ s. q : acceleration,
-    orientation.
+    P : (784,) as in updates.py. dx : (28,) scratch, passed in so that its length is unknown to the compiler
+    (`apply_rows`). lengths : half hip width, half foot, leg. swing : m² at toe-off, least m², λ s.
+    q : acceleration, orientation.
     """
     z_variance, form, scratch = np.empty(2), make_form(), make_scratch()
     work, turned, factors, blocks = (

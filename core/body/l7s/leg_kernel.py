@@ -21,10 +21,11 @@ def _unit(a):  # type: ignore[no-untyped-def]
 def write_legs(  # type: ignore[no-untyped-def]
     R, p, hip_width, thigh, shank, foot, side, to_leg, to_foot, q, at, reach, hinge
 ):
-    """Write q (T, 7, 4), at (T, 7, 3): pelvis, and thigh, shank, foot of each leg, from the filter's R, p.
+    """Write q (T, 7, 4) and positions `at` (T, 7, 3): pelvis, and thigh, shank, foot of each leg, from the
+    filter's R, p.
 
     side : (2,) sign of the hip on the pelvis' y axis. to_leg, to_foot : (3, 3) M of R_ISB = R_Sy M. reach,
-    hinge : (T, 2) written, distance of ankle and hip, distance of the hip from the plane of the foot.
+    hinge : (T, 2) written, distance between ankle and hip, distance of the hip from the plane of the foot.
     """
     M, turned = np.empty((3, 3)), np.empty((3, 3))
     along, bent, x, y, z, across = np.empty((6, 3))

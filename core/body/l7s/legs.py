@@ -1,8 +1,8 @@
-"""Sy's body model: its lengths, its frames against ours, and the legs from hip, ankle and hinge axis.
+"""Sy's body model: its lengths, its frames and ours, and the legs from hip, ankle and hinge axis.
 
 Sy's frames (docs/science/l7s.md, "Frames and symbols"): pelvis, thigh and shank x forward, y left, z up; foot
-z from ankle to toe, y left, x down. We keep the inclination of the line from ankle to toe under the sole's
-forward axis, so that nothing of it is left in our foot frame; with it 0 the conversion is M_FOOT alone.
+z from ankle to toe, y left, x down. The inclination of the line from ankle to toe relative to the sole's
+forward axis is kept, so that it does not appear in our foot frame; if it is 0 the conversion is M_FOOT alone.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from sagittal.core.body.kinematics import sole_points
 from sagittal.core.body.model import BodyModel
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import FOOT, SHANK, THIGH, Floats, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import about, to_matrix
 
 BODIES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
@@ -47,8 +48,9 @@ class LegModel:
 
     Parameters
     ----------
-    foot : from the ankle to the toe point on the floor, the ball. incline : of that line under the sole's
-    forward axis, rad. hip_height : mid-hip over the floor in standing. foot_height : of the foot's middle.
+    foot : from the ankle to the toe point on the floor, the ball. incline : of that line below the sole's
+        forward axis, rad. hip_height : mid-hip above the floor in standing. foot_height : of the middle of
+        the foot.
     """
 
     hip_width: float
@@ -62,19 +64,23 @@ class LegModel:
 
     @classmethod
     def of(cls, body: BodyModel) -> LegModel:
-        """The model of a person standing straight on a flat foot.
+        """The model of a person standing upright on flat feet.
 
         Raises
         ------
-        EstimationError `segment_length` when a length is not positive and finite.
+        EstimationError `segment_length` if a length is not positive and finite.
         """
         for name in ("hip_width", "thigh", "shank", "ankle_height", "foot"):
             length = getattr(body, name)
             if not (np.isfinite(length) and length > 0.0):
                 raise EstimationError(
                     "segment_length",
-                    f"The body model's {name} is {length:g} m, expected above 0; enter the body height or "
-                    "measure the segment.",
+                    Message(
+                        "The body model's {name} is {length:g} m, expected above 0; enter the body height "
+                        "or measure the segment.",
+                        name=name,
+                        length=length,
+                    ),
                 )
         forward, drop, _ = sole_points(body)[1]
         return cls(
@@ -102,8 +108,8 @@ class Legs:
     Parameters
     ----------
     q : (n, 7, 4), p : (n, 7, 3) of `FIGURE`, mid-hip for the pelvis, hip for thighs, knee for shanks, ankle
-    for feet, m. reach : (n, 2) distance of ankle and hip of `LEGS`, m. hinge : (n, 2) distance of the hip
-    from the plane of the foot, m, zero when the hinge constraint holds.
+    for feet, m. reach : (n, 2) distance between ankle and hip of `LEGS`, m. hinge : (n, 2) distance of the
+    hip from the plane of the foot, m, zero when the hinge constraint holds.
     """
 
     q: Floats
@@ -121,7 +127,7 @@ def solve_legs(R: Floats, p: Floats, model: LegModel) -> Legs:
 
     References
     ----------
-    Sy 2021 eq 40–44. Where the leg is longer than thigh and shank (the cosine passes 1) the knee is straight.
+    Sy 2021 eq 40–44. If the leg is longer than thigh and shank (the cosine exceeds 1) the knee is straight.
     """
     from sagittal.core.body.l7s.leg_kernel import write_legs
 

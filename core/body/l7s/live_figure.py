@@ -1,4 +1,4 @@
-"""The live figure of pelvis and feet, or of feet alone, by L7S; distances from each foot's own ErKF."""
+"""Live poses of pelvis and feet, or of feet alone, by L7S; distances from a separate ErKF per foot."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from sagittal.core.signals.calibrated import SegmentCalibration
 
 
 class LiveL7s:
-    """Seven poses from three sensors or two."""
+    """Poses of seven segments from three sensors or two."""
 
     segments: tuple[Segment, ...] = FIGURE
     linked = False
@@ -55,11 +55,11 @@ class LiveL7s:
 
     @property
     def broken(self) -> bool:
-        """Whether the filter gave up."""
+        """Whether the filter has failed."""
         return self._broken or self._feet.broken
 
     def push(self, raw: MeasuredBlock) -> BodyBlock:
-        """The next samples; the first block is the whole standing window."""
+        """Process the next samples; the first block is the whole standing window."""
         paths = self._feet.push(raw)
         inputs = self._inputs(raw, paths.still & paths.valid)
         if self._state is None:
@@ -71,7 +71,7 @@ class LiveL7s:
         return BodyBlock(legs.q, legs.p, np.repeat(whole[:, None], len(FIGURE), axis=1), whole, paths)
 
     def drain_notices(self) -> list[Notice]:
-        """What is new to be said of itself."""
+        """New notices; always empty."""
         return []
 
     def _inputs(self, raw: MeasuredBlock, step: Bools) -> L7sInputs:
@@ -82,7 +82,7 @@ class LiveL7s:
         return arrange_inputs(raw.turned, acceleration, step, self._model, self._worn)
 
     def _filtered(self, inputs: L7sInputs) -> L7sTrack:
-        """The track of a block; NaN from the sample on at which the legs cannot be put together any more."""
+        """The track of a block; NaN from the sample on at which the leg constraints cannot be satisfied."""
         T = len(inputs.step)
         whole = L7sTrack(
             np.full((T, 3, 3, 3), np.nan), np.full((T, 3, 3), np.nan), np.full((T, 3, 3), np.nan),

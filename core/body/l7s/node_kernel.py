@@ -1,10 +1,10 @@
-"""The compiled Gauss–Newton pass of L7S over the nodes of a take (core/body/l7s/smoother.py).
+"""The compiled Gauss–Newton pass of L7S over the nodes of a recording (core/body/l7s/smoother.py).
 
-The normal equations are tied from node to node: 9 × 9 within one, a full block to the next and, by the
-accelerations, a diagonal one to the next but one. Node after node is written and eliminated at once, and the
-moves follow backwards, so that a pass goes through memory twice. With A a node's block when those before it
-are eliminated, B and G what ties it to the next two and g its right side, what is kept of it is
-V = −A⁻¹ and [B g]ᵀ V.
+The normal equations couple neighbouring nodes: 9 × 9 within one, a full block to the next and, through the
+accelerations, a diagonal one to the next but one. Each node is written and eliminated in one step, and the
+updates follow backwards, so that a pass traverses memory twice. With A the block of a node after elimination
+of the previous ones, B and G its coupling to the next two and g its right-hand side, V = −A⁻¹ and [B g]ᵀ V
+are stored.
 """
 
 from __future__ import annotations
@@ -29,7 +29,9 @@ _WIDTH: Final = 12
 
 @inner_njit(error_model="numpy", **UNCOUNTED)
 def _combine(factors, apart, rows, width, base, out, n):  # type: ignore[no-untyped-def]
-    """Write the first n of `base` and of nine rows, so wide, each times its factor; those lie `apart`."""
+    """Write the first n of `base` plus nine rows of this width, each times its factor; the factors are
+    `apart` entries apart.
+    """
     a, b, c = factors[0], factors[apart], factors[2 * apart]
     d, e, g = factors[3 * apart], factors[4 * apart], factors[5 * apart]
     h, p, q = factors[6 * apart], factors[7 * apart], factors[8 * apart]
@@ -43,7 +45,7 @@ def _combine(factors, apart, rows, width, base, out, n):  # type: ignore[no-unty
 
 @inner_njit(error_model="numpy", **UNCOUNTED)
 def _sweep(A, column):  # type: ignore[no-untyped-def]
-    """Write −A⁻¹ over the lower triangle of A (81,); False if A is not positive definite."""
+    """Write −A⁻¹ to the lower triangle of A (81,); False if A is not positive definite."""
     for k in range(SIZE):
         for i in range(SIZE):
             column[i] = A[SIZE * k + i] if i < k else A[SIZE * i + k]
@@ -64,10 +66,10 @@ def _sweep(A, column):  # type: ignore[no-untyped-def]
 
 @inner_njit(error_model="numpy", **UNCOUNTED)
 def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped-def]
-    """Add the rows of both legs at node k: hinge, leg that carries, leg too long.
+    """Add the rows of both legs at node k: hinge, supporting leg, leg too long.
 
-    spread : weights of the three. Every row pulls hip and ankle apart along a direction, so that a leg is one
-    matrix (3, 3) for pelvis and foot, and minus the same between them.
+    spread : weights of the three. Every row acts on hip and ankle along one direction, so that a leg is one
+    matrix (3, 3) for pelvis and foot, and its negative between them.
     """
     for leg in range(2):
         f = 3 * (1 + leg)
@@ -102,16 +104,16 @@ def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped
 def move_nodes(  # type: ignore[no-untyped-def]
     x, start, R, bent, stiff, still, hold, spread, lengths, heights, kept
 ):
-    """Move the places x (T, 9) by one pass; return the longest move of a place, NaN where none can be found.
+    """Update the positions x (T, 9) by one pass; return the largest change of a position, NaN without a
+    solution.
 
     Parameters
     ----------
     start : the filter's. R : (T, 3, 3, 3). bent : second differences of the integrated accelerations. still :
-    (T, 2) from each node to the next. lengths : half hip width, half foot, leg, leg that carries. heights :
-    pelvis, foot. kept : (T, KEPT) scratch.
-    Weights: stiff (T + 1, 3) of the second differences, 0 at both ends; hold (6,) of the filter's places, a
-    resting foot's way, the mid-pelvis, the heights of pelvis, foot on its way and foot at rest; spread (3,)
-    of hinge, leg that carries, leg too long.
+    (T, 2) from each node to the next. lengths : half hip width, half foot, leg, supporting leg. heights :
+    pelvis, foot. kept : (T, KEPT) scratch. Weights: stiff (T + 1, 3) of the second differences, 0 at both
+    ends; hold (6,) of the filter's positions, displacement of a resting foot, the mid-pelvis, the heights of
+    pelvis, moving foot and resting foot; spread (3,) of hinge, supporting leg, leg too long.
     """
     T, n = len(x), SIZE
     A, column = np.zeros(n * n), np.zeros(n)

@@ -1,6 +1,6 @@
-"""Seven poses from three IMUs or two by Sy's L7S; the filter is in core/body/l7s/filter.py.
+"""Poses of seven segments from three IMUs or two by Sy's L7S; the filter is in core/body/l7s/filter.py.
 
-A sparse mode of visibly lower accuracy: never take stride lengths from it where anything better is worn
+A sparse mode of visibly lower accuracy: never take stride lengths from it if a better source is available
 (docs/science/l7s.md, "Limits").
 """
 
@@ -25,6 +25,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.estimators import L7S_2I, L7S_3I
 from sagittal.core.frames import FOOT, R_NEUTRAL, Bools, Floats, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
+from sagittal.core.message import Message
 from sagittal.core.rotation import angle_between, from_matrix
 from sagittal.core.signals.held_samples import SampleSeries, cut_blocks, give_pages_back, make_room
 
@@ -48,26 +49,26 @@ def l7s_poses(
 
     Parameters
     ----------
-    orientations : of the worn segments; others are not read.
+    orientations : of the instrumented segments; others are ignored.
     acceleration : segment → (n, 3) in W without gravity, m/s²
         (`sagittal.core.body.l7s.inputs.free_acceleration`).
     steps : side → (n,) foot still on the floor: zero velocity, not contact.
-    worn : None = 3I with a pelvis, else 2I. both_ways : places from what comes before and after
-        (core/body/l7s/smoother.py); False gives the filter's, as they are live.
+    worn : None = 3I with a pelvis, else 2I. both_ways : smoothed positions (core/body/l7s/smoother.py); False
+        returns those of the filter, as in live use.
 
     Returns
     -------
-    Poses in ISB frames, method of L7S-3I or L7S-2I, `contact` = steps. After a loss of a foot they are valid
-    again from its next rest on: until then nobody knows where it went. The feet's orientation is that of the
-    constrained state and differs from the measured one by some degrees (docs/science/l7s.md, "Constraints").
-    Diagnostics by side: `knee_straight_share`, samples with a foot in motion at which the leg is at its full
-    length, so that the knee is a bound and no measurement; `hinge_m`, `excess_m`, largest residuals of the
-    constraints; `step_share`; `sensor_ahead_m`, how far the foot's sensor was found ahead of the foot's
-    middle (0 both_ways=False); `foot_turned_rad`, mean angle from measured to reported.
-    `passes` of Gauss–Newton and `moved_m`, how far places moved in the last.
-    At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest loss.
-    And those of `walking_checks`. Health and notices as of health.py; a notice `foot_never_still` when a
-    foot has no step.
+    Poses in ISB frames, method of L7S-3I or L7S-2I, `contact` = steps. After a data loss of a foot they are
+    valid again from its next rest on, because its position is unknown until then. The feet's orientation is
+    that of the constrained state and differs from the measured one by some degrees (docs/science/l7s.md,
+    "Constraints"). Diagnostics by side: `knee_straight_share`, fraction of samples with a foot in motion and
+    the leg at full length, where the knee angle is a bound and not a measurement; `hinge_m`, `excess_m`,
+    largest residuals of the constraints; `step_share`; `sensor_ahead_m`, estimated distance of the foot
+    sensor in front of the middle of the foot (0 with both_ways=False); `foot_turned_rad`, mean angle from
+    measured to reported. `passes` of Gauss–Newton and `moved_m`, the largest change of position in the last.
+    At the end: `position_sd_m` by body, `min_eigenvalue` of P. By sensor: `gap_s`, the longest data loss. And
+    those of `walking_checks`. Health and notices as in health.py; a notice `foot_never_still` if a foot has
+    no step.
 
     Raises
     ------
@@ -111,9 +112,9 @@ def l7s_poses(
 
 
 class _Figure:
-    """The seven segments of a take, window by window, and what is measured on them.
+    """The seven segments of a recording, accumulated window by window, and their diagnostics.
 
-    q, p : as in `Poses`. seen : what the checks look at.
+    q, p : as in `Poses`. seen : input of the checks.
     """
 
     def __init__(self, take: L7sTake) -> None:
@@ -130,7 +131,7 @@ class _Figure:
         self._turned: list[Floats] = []
 
     def add(self, window: PlacedWindow) -> None:
-        """The next samples."""
+        """Add the next samples."""
         length = self._model.thigh + self._model.shank
         self._passes, self._moved = max(self._passes, window.passes), max(self._moved, window.moved)
         for part in cut_blocks(len(window.R)):
@@ -148,7 +149,7 @@ class _Figure:
         give_pages_back((*self.q.values(), *self.p.values()))
 
     def add_all(self, windows: Iterable[PlacedWindow]) -> Floats:
-        """All windows of the take, one at a time; P at their end."""
+        """Add all windows of the recording, one at a time; returns the final P."""
         P = np.empty((0, 0))
         for window in windows:
             self.add(window)
@@ -157,7 +158,7 @@ class _Figure:
         return P
 
     def measure(self) -> dict[str, object]:
-        """The diagnostics of `l7s_poses` that the windows give."""
+        """The diagnostics of `l7s_poses` that are accumulated over the windows."""
         turned, moving = np.concatenate(self._turned), np.count_nonzero(self._moving)
         self._turned.clear()
         return {
@@ -171,7 +172,7 @@ class _Figure:
 
 
 def _describe_filter(steps: Mapping[Side, Bools], offsets: Floats, P: Floats) -> dict[str, object]:
-    """The diagnostics of `l7s_poses` that steps, sensors' places and covariance give."""
+    """The diagnostics of `l7s_poses` from steps, sensor positions and covariance."""
     variances = np.diag(P)[:18].reshape(3, 6)[:, :3]
     return {
         "step_share": {s: float(np.mean(steps[s])) for s in LEGS},
@@ -185,8 +186,12 @@ def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
     return tuple(
         Notice(
             "foot_never_still",
-            f"The {side} foot is never still in this take, so nothing bounds its speed; positions and step "
-            "lengths mean nothing. A treadmill or a sensor on another segment looks like this.",
+            Message(
+                "The {side} foot is never still in this take, so nothing bounds its speed; "
+                "positions and step lengths mean nothing. A treadmill or a sensor on another "
+                "segment looks like this.",
+                side=side,
+            ),
             sensor=FOOT[side],
         )
         for side in LEGS
@@ -195,7 +200,9 @@ def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
 
 
 def compile_l7s_kernel() -> None:
-    """Compile or load the kernels of filter, smoother and legs: the first take does not wait for them."""
+    """Compile the kernels of filter, smoother and legs or load them, so that the first recording is not
+    delayed.
+    """
     model = LegModel.of(BodyModel.from_height(NOMINAL_HEIGHT_M))
     foot = model.to_isb("foot_l").T
     n = 40

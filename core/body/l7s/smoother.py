@@ -1,12 +1,12 @@
-"""L7S over a whole take: the places of pelvis and feet that fit what comes before and after.
+"""Smoothed L7S over a whole recording: positions of pelvis and feet from past and future samples.
 
-The filter knows of each sample only what came before. Its pelvis is early by a part of a step, and the pull
-to the standing height lifts it in every step until the knee rests at its bound. With the take at hand the
-same measurements are one least-squares problem in the places of the three bodies at nodes 20 ms apart
-(docs/science/l7s.md, "Both ways"). Orientations are the measured ones; accelerations are integrated twice
-between the nodes, so that what is solved for is a slow correction.
+The filter uses only past samples. Its pelvis is ahead by a fraction of a step, and the pull to the standing
+height lifts it in every step until the knee reaches its bound. With the whole recording the same measurements
+form one least-squares problem in the positions of the three bodies at nodes 20 ms apart (docs/science/l7s.md,
+"Both ways"). Orientations are the measured ones; accelerations are integrated twice between the nodes, so
+that the unknowns are slow corrections.
 
-Weights are densities: variance times twice the time that the error lasts.
+Weights are densities: variance times twice the correlation time of the error.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from sagittal.core.body.l7s.legs import LegModel
 from sagittal.core.body.l7s.node_kernel import KEPT, move_nodes
 from sagittal.core.errors import EstimationError
 from sagittal.core.frames import Bools, Floats
+from sagittal.core.message import Message
 
 NODE_S: Final = 0.02
 """Time between nodes: a brisk walker's foot rests for some 40 ms. Half of it changes flexion by 0.1°."""
@@ -77,13 +78,13 @@ PROJECTIONS: Final = 3
 
 @dataclass(frozen=True, eq=False)
 class WholeTrack:
-    """Poses of BODIES that meet the constraints.
+    """Poses of BODIES that satisfy the constraints.
 
     Parameters
     ----------
-    R : (n, 3, 3, 3) and p : (n, 3, 3) in Sy's frames. passes : of Gauss–Newton. moved : the longest move of a
-    place in the last of them, m. offsets : (2, 3) from each foot's sensor to the foot's middle
-    (`find_sensor_offsets`).
+    R : (n, 3, 3, 3) and p : (n, 3, 3) in Sy's frames. passes : number of Gauss–Newton iterations. moved :
+    largest change of a position in the last, m. offsets : (2, 3) from each foot's sensor to the middle of the
+    foot (`find_sensor_offsets`).
     """
 
     R: Floats
@@ -102,17 +103,17 @@ def smooth_track(
     offsets: Floats | None = None,
     first: int = 0,
 ) -> WholeTrack:
-    """Find the places of pelvis and feet over a take, or a part of it.
+    """Estimate the positions of pelvis and feet over a recording, or a part of it.
 
     Parameters
     ----------
-    track : of the filter on these inputs. valid : (n, 3) sensor there; of a body without one it is not read.
-    offsets : (2, 3) as `find_sensor_offsets`; None = found in these inputs. first : sample of the take that
-        they begin with.
+    track : of the filter on these inputs. valid : (n, 3) sensor available; ignored for a body without one.
+        offsets : (2, 3) as `find_sensor_offsets`; None = estimated from these inputs. first : sample of the
+        recording at which they begin.
 
     Raises
     ------
-    EstimationError `l7s_diverged` when the places cannot be found or a constraint cannot be met.
+    EstimationError `l7s_diverged` if there is no solution or a constraint cannot be satisfied.
     """
     R, acc = inputs.R.copy(), inputs.acc.copy()
     density = np.where(valid, DENSITY, DENSITY_LOST)
@@ -143,14 +144,17 @@ def smooth_track(
         failed += first
         raise EstimationError(
             "l7s_diverged",
-            f"The leg constraints cannot be met at sample {failed}; check which foot each sensor is on and "
-            "the body height.",
+            Message(
+                "The leg constraints cannot be met at sample {failed}; check which foot each sensor "
+                "is on and the body height.",
+                failed=failed,
+            ),
         )
     return WholeTrack(R, p, passes, moved, offsets)
 
 
 def find_hop(rate_hz: float) -> int:
-    """Samples from node to node."""
+    """Number of samples between nodes."""
     return max(1, round(NODE_S * rate_hz))
 
 
@@ -163,17 +167,19 @@ def solve_nodes(
     x: Floats, pull: Floats, free: Floats, R: Floats, density: Floats, still: Bools, hop_s: float,
     lengths: Floats, heights: Floats,
 ) -> tuple[Floats, int, float]:  # fmt: skip
-    """Places (T, 9) of the nodes by Gauss–Newton, the passes it took, and the longest move of the last, m.
+    """Positions (T, 9) of the nodes by Gauss–Newton, the number of iterations, and the largest change in the
+    last, m.
 
     Parameters
     ----------
-    x : (T, 9) to begin with. pull : (T, 9) the filter's. free : (T, 9) ways by integration. density : (T, 3)
-    and still : (T, 2) from each node to the next. lengths : half hip width, half foot, leg, leg that carries.
-    heights : pelvis, foot.
+    x : (T, 9) initial values. pull : (T, 9) those of the filter. free : (T, 9) integrated displacements.
+        density : (T, 3)
+    and still : (T, 2) from each node to the next. lengths : half hip width, half foot, leg, supporting leg.
+        heights : pelvis, foot.
 
     Raises
     ------
-    EstimationError `l7s_diverged` when there are none.
+    EstimationError `l7s_diverged` without a solution.
     """
     x = x.copy()
     bent = np.zeros_like(x)
@@ -198,7 +204,7 @@ def solve_nodes(
 
 
 def _level_pelvis(R: Floats) -> Floats:
-    """Level pelvis (n, 3, 3) that faces between the feet."""
+    """Level pelvis (n, 3, 3) facing the mean direction of the feet."""
     toward = R[:, 1, :2, 2] + R[:, 2, :2, 2]
     toward = toward / np.maximum(np.linalg.norm(toward, axis=1), 1e-9)[:, None]
     level = np.zeros((len(R), 3, 3))
@@ -209,13 +215,13 @@ def _level_pelvis(R: Floats) -> Floats:
 
 
 def _integrate_twice(acc: Floats, dt: float) -> Floats:
-    """Ways (n, 3, 3) from accelerations, each constant up to its sample as in the filter."""
+    """Displacements (n, 3, 3) from accelerations, each constant up to its sample as in the filter."""
     v = np.cumsum(dt * acc, axis=0)
     return np.asarray(np.cumsum(dt * v - 0.5 * dt * dt * acc, axis=0))
 
 
 def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
-    """Corrections (n, 3, 3) on straight lines between the nodes, past the last on the last line."""
+    """Corrections (n, 3, 3) linearly interpolated between the nodes, extrapolated after the last one."""
     hop = int(at[1])
     k = np.minimum(np.arange(n) // hop, len(at) - 2)
     share = ((np.arange(n) - at[k]) / hop)[:, None, None]
@@ -224,10 +230,10 @@ def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _project_all(R, p, lengths):  # type: ignore[no-untyped-def]
-    """Project every sample onto the constraints in place; return the sample that failed, −1 if none did.
+    """Project every sample onto the constraints in place; return the sample that failed, or −1.
 
-    The filter's projection with what may move here: a foot turns by 0.1 rad as easily as a body shifts by
-    1 cm, the pelvis keeps its orientation.
+    The filter's projection with different variances: rotating a foot by 0.1 rad is weighted like shifting a
+    body by 1 cm, the pelvis keeps its orientation.
     """
     spread = np.array([1e-4, 1e-4, 1e-4, 1e-8, 1e-8, 1e-8, 1e-4, 1e-4, 1e-4, 1e-2, 1e-2, 1e-2])
     dx, scratch = np.zeros(18), make_scratch()

@@ -1,11 +1,11 @@
-"""What every update of L7S does with its local error ε ∈ R²⁷: one row, the injection, the reset of P.
+"""Common parts of every L7S update with its local error ε ∈ R²⁷: one row, the injection, the reset of P.
 
 X ← X Exp(ε), ε = (ρ_p φ_p ρ_lf φ_lf ρ_rf φ_rf ν_p ν_lf ν_rf). With diagonal R the stacked update of Sy 2021
-eq 9–12 equals one row after the other at one linearisation: the correction dx is added up and the residual of
-each row is taken at dx (docs/science/erkf.md, "Corrections").
+eq 9–12 equals sequential rows at one linearisation: the correction dx is accumulated and the residual of each
+row is evaluated at dx (docs/science/erkf.md, "Corrections").
 
-P lies flat, its rows filled up with zeros to 28 numbers: the compiler sees then how far they are from each
-other, and works on four or eight numbers of a row at once.
+P is stored flat, its rows padded with zeros to 28 numbers: the compiler then knows the stride and processes
+four or eight numbers of a row at once.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ VELOCITY = 18
 
 @inner_njit()
 def make_form():  # type: ignore[no-untyped-def]
-    """Room for three rows of a measurement, as `apply_rows` takes them."""
+    """Allocate three rows of a measurement, as used by `apply_rows`."""
     return np.zeros(3, np.int64), np.zeros((3, 9)), np.zeros(3), np.zeros(3), np.zeros(3 * WIDTH)
 
 
 @inner_njit(error_model="numpy", **UNCOUNTED)
 def apply_rows(P, dx, triples, form):  # type: ignore[no-untyped-def]
-    """Three rows of the stacked update, P at the end: fetching it costs more than the arithmetic.
+    """Apply three rows of the stacked update, with P last: memory access costs more than the arithmetic.
 
     Parameters
     ----------
-    dx : (28,), of a length that the compiler does not know: known loops it unrolls, and does not work on
-    vectors. triples : how many places, rotations or velocities the rows read. form : of `make_form`; where
-    they begin in ε, H of the rows at those, residuals, variances, and room for gains. A row of zeros changes
-    nothing.
+    dx : (28,), with a length unknown to the compiler, which would otherwise unroll the loops instead of
+        vectorising them. triples : number of positions, rotations or velocities that the rows involve. form :
+        of `make_form`; their offsets in ε, H of the rows at those, residuals, variances, and space for gains.
+        A row of zeros has no effect.
     """
     at, H, residual, variance, gain = form
     n = len(dx)

@@ -1,8 +1,9 @@
-"""A take of L7S in windows: the filter runs through, the places are found window by window.
+"""L7S over a recording in windows: the filter runs through, positions are estimated window by window.
 
-Of a long take the equations of all nodes do not fit into memory: a sample of them has 3 kB. What is measured
-fixes the places of a node within some minute around it, so that a window which is solved with more than
-that on both sides gives in its middle what the whole take gives (docs/science/l7s.md, "Both ways").
+For a long recording the equations of all nodes do not fit into memory: they take 3 kB per sample.
+Measurements influence the positions of a node only within about a minute, so a window solved with a larger
+margin on both sides gives the same result in its middle as the whole recording (docs/science/l7s.md, "Both
+ways").
 """
 
 from __future__ import annotations
@@ -34,11 +35,11 @@ AROUND_S: Final = 120.0
 
 @dataclass(frozen=True, eq=False)
 class PlacedWindow:
-    """Successive samples with the places that were found.
+    """Consecutive samples with their estimated positions.
 
     Parameters
     ----------
-    first : sample of the take that it begins with. inputs, track : of the filter. R : (n, 3, 3, 3) and
+    first : first sample in the recording. inputs, track : of the filter. R : (n, 3, 3, 3) and
     p : (n, 3, 3) of BODIES in Sy's frames. passes, moved : of `WholeTrack`. P : (27, 27)
     of the filter after it.
     """
@@ -54,9 +55,9 @@ class PlacedWindow:
 
 
 def cut_windows(samples: int, rate_hz: float) -> list[tuple[slice, slice]]:
-    """Windows of a take, each as what is solved and what of that is the window's own.
+    """Windows of a recording, each as the solved range and the range within it to be used.
 
-    All begin on a node of the take, so that they have its nodes.
+    All begin on a node of the recording, so that nodes coincide.
     """
     count = 1 if samples <= WHOLE else -(-samples // LONG)
     hop, around = find_hop(rate_hz), round(AROUND_S / NODE_S) * find_hop(rate_hz)
@@ -71,19 +72,19 @@ def cut_windows(samples: int, rate_hz: float) -> list[tuple[slice, slice]]:
 def place_windows(
     take: L7sTake, valid: Bools | None, rate_hz: float, params: L7sParams
 ) -> tuple[Floats, Iterator[PlacedWindow]]:
-    """Filter a take and find the places of its bodies.
+    """Filter a recording and estimate the positions of its bodies.
 
     Parameters
     ----------
-    valid : (n, 3) as in `smooth_track`; None = the places are the filter's.
+    valid : (n, 3) as in `smooth_track`; None = use the filter's positions.
 
     Returns
     -------
-    `WholeTrack.offsets`, and the windows one after the other.
+    `WholeTrack.offsets`, and an iterator over the windows.
 
     Raises
     ------
-    EstimationError of `filter_block` and `smooth_track`, when a window is asked for.
+    EstimationError as `filter_block` and `smooth_track`, when a window is requested.
     """
     offsets = np.zeros((len(LEGS), 3))
     if valid is not None:
@@ -116,7 +117,7 @@ def _windows(
 
 
 def join_inputs(before: L7sInputs, after: L7sInputs) -> L7sInputs:
-    """Two successive blocks as one."""
+    """Concatenate two consecutive blocks."""
     return L7sInputs(
         np.concatenate((before.R, after.R)),
         np.concatenate((before.acc, after.acc)),
@@ -126,6 +127,6 @@ def join_inputs(before: L7sInputs, after: L7sInputs) -> L7sInputs:
 
 
 def join_tracks(before: L7sTrack, after: L7sTrack) -> L7sTrack:
-    """The same of what the filter says."""
+    """Concatenate two consecutive tracks."""
     pairs = zip(vars(before).values(), vars(after).values(), strict=True)
     return L7sTrack(*(np.concatenate(pair) for pair in pairs))

@@ -1,1 +1,1 @@
-"""Files of sensor makers: one module each, listed in registry."""
+"""Vendor file formats: one module each, listed in registry."""

@@ -1,7 +1,7 @@
 """APDM Opal: CSV of Motion Studio ("Format=7") and of Mobility Lab, all monitors in one file.
 
 Acceleration in m/s², angular rate in rad/s and magnetic field in µT in the monitor's axes; orientation with
-the scalar first. A monitor's label says where it is worn (docs/reference/formats.md, "APDM").
+the scalar first. A monitor's label gives its placement (docs/reference/formats.md, "APDM").
 """
 
 from __future__ import annotations
@@ -38,14 +38,16 @@ _MICRO: Final = 1e-6
 
 @dataclass(frozen=True)
 class _Monitor:
-    """A monitor's label and, for every signal of it, the names of its columns."""
+    """A monitor's label and the column names of each of its signals."""
 
     label: str
     columns: dict[str, tuple[str, ...]]
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell an APDM CSV by its first line, or by a header line "Time,label/Acceleration/X"."""
+    """Whether the first line is that of an APDM CSV, or there is a header line
+    "Time,label/Acceleration/X".
+    """
     return data.startswith(_STUDIO) or _LAB_HEADER.search(data[:8192]) is not None
 
 
@@ -62,7 +64,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _read_studio(data: bytes, source: str, spec: SourceSpec | None) -> tuple[Draft, ...]:
-    """Three header lines: id and label of each monitor over its columns, signals, axes; time in µs."""
+    """Three header lines: id and label of each monitor above its columns, signals, axes; time in µs."""
     lines = text.head_lines(data, 3)
     if len(lines) < 3:
         raise FormatError("empty", f"{source} has a header but no samples; export it again.")
@@ -129,7 +131,7 @@ def _read_table(
     rate_hz: float | None,
     ids: dict[str, str],
 ) -> tuple[Draft, ...]:
-    """Rows without a header as one sensor per label. ids : label → the monitor's number, if known."""
+    """Rows without header as one sensor per label. ids : label → the monitor's number, if known."""
     columns = text.fit_names(names, body, b",")
     monitors = _find_monitors(columns)
     if not monitors:

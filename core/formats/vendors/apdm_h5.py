@@ -1,8 +1,9 @@
 """APDM Opal: HDF5 files of version 5 (docs/reference/formats.md, "APDM"). Reading them needs h5py.
 
-`Sensors/<id>`: Accelerometer m/s², Gyroscope rad/s, Magnetometer µT, (n, 3) each in the monitor's axes,
-Time in µs since 1970; its group Configuration says by "Label 0" where the monitor is worn.
-`Processed/<id>/Orientation` (n, 4), scalar first. Links and layouts that lead out of the file are refused.
+`Sensors/<id>`: Accelerometer m/s², Gyroscope rad/s, Magnetometer µT, (n, 3) each in the monitor's axes, Time
+in µs since 1970; "Label 0" in its group Configuration gives the placement of the monitor.
+`Processed/<id>/Orientation` (n, 4), scalar first. Links and layouts that refer to data outside the file are
+rejected.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _MICRO: Final = 1e-6
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell an APDM file by the signature of HDF5 and the names of its groups."""
+    """Whether the data have the signature of HDF5 and the group names of APDM."""
     return data.startswith(MAGIC) and b"Sensors" in data and b"Accelerometer" in data
 
 
@@ -71,18 +72,18 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 class _Tree:
-    """Groups and arrays of a file, none of which may lie elsewhere; counts what is asked for."""
+    """Groups and arrays of a file, none of them external; counts the values requested."""
 
     def __init__(self, root: Any, source: str) -> None:
         self._root, self._source, self._values = root, source, 0
 
     def names(self, path: str) -> list[str]:
-        """Members of a group, none where there is no such group."""
+        """Members of a group, empty if it does not exist."""
         group = self._get(path)
         return list(group)[: _MOST_SENSORS + 1] if group is not None else []
 
     def array(self, path: str, width: int) -> Floats | None:
-        """Numbers (n, width), or (n,) where the width is 1; None where there are none."""
+        """Numbers (n, width), or (n,) if the width is 1; None if absent."""
         found = self._get(path)
         if found is None:
             return None
@@ -97,7 +98,7 @@ class _Tree:
         return np.asarray(found[()], np.float64)
 
     def said(self, path: str, name: str) -> str:
-        """An attribute of a group as text, empty without one."""
+        """An attribute of a group as text, empty if absent."""
         group = self._get(path)
         value = "" if group is None else group.attrs.get(name, "")
         text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

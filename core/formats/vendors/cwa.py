@@ -1,8 +1,8 @@
 """Axivity AX3 and AX6: CWA files, read block by block.
 
-A header of 1024 bytes, then blocks of 512 with 40 to 120 samples each, a clock reading and a check sum, as
-the maker describes them (Open Movement, "AX3 technical documentation", "CWA File Data Blocks").
-Acceleration in g, packed in 32 bits a sample or as 16-bit numbers; an AX6 puts its gyroscope before it.
+A header of 1024 bytes, then blocks of 512 with 40 to 120 samples each, a clock reading and a checksum, as
+documented by the manufacturer (Open Movement, "AX3 technical documentation", "CWA File Data Blocks").
+Acceleration in g, packed in 32 bits per sample or as 16-bit numbers; with an AX6 preceded by the gyroscope.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Opener = Callable[[], BinaryIO]
 
 @dataclass(frozen=True, eq=False)
 class _Decoded:
-    """Samples of successive blocks: start (b,) s of the device's clock, count (b,), acc and gyr (n, 3)."""
+    """Samples of consecutive blocks: start (b,) s of the device's clock, count (b,), acc and gyr (n, 3)."""
 
     start_s: Floats
     count: NDArray[np.int64]
@@ -65,16 +65,16 @@ class _Decoded:
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell a CWA file by its first bytes."""
+    """Whether the first bytes are those of a CWA file."""
     return data[:4] == MAGIC
 
 
 def open_long(source: str, opener: Opener) -> LongStream:
-    """A CWA file as a sensor whose samples are read when somebody goes through them.
+    """Open a CWA file as a sensor whose samples are read on iteration.
 
     Raises
     ------
-    FormatError : `empty` without a whole block, `bad_cwa` where blocks of several kinds are mixed.
+    FormatError : `empty` without a complete block, `bad_cwa` if blocks of different kinds are mixed.
     """
     with opener() as file:
         header = file.read(HEADER)
@@ -99,7 +99,7 @@ def open_long(source: str, opener: Opener) -> LongStream:
 
 
 def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draft, ...]:
-    """A short CWA file at once, as any other reader gives it; raises as `open_long`."""
+    """Read a short CWA file as a whole, like any other reader; raises as `open_long`."""
     stream = open_long(source, lambda: BytesIO(data))
     most = _count_most(data)
     ticks, acc = np.empty(most), np.empty((most, 3))
@@ -137,19 +137,19 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _count_most(data: bytes) -> int:
-    """How many samples all blocks hold together, damaged ones included."""
+    """Upper limit of the number of samples in all blocks, damaged ones included."""
     blocks = max(0, len(data) - HEADER) // BLOCK
     count = np.frombuffer(data, _BLOCK, blocks, min(HEADER, len(data)))["count"]
     return int(np.minimum(count, MOST_SAMPLES).sum())
 
 
 def _rate(code: int, offset: int) -> float:
-    """Samples per second by the code of a block; without one an old file has it in the offset."""
+    """Samples per second from the code of a block; old files without one have it in the offset."""
     return float(offset) if code == 0 else 3200.0 / (1 << (15 - (code & 15)))
 
 
 def _first_block(file: BinaryIO) -> NDArray[Any] | None:
-    """Head (1,) of the first whole block, None without one."""
+    """Header (1,) of the first complete block, None without one."""
     while len(data := file.read(BLOCK * AT_ONCE)) >= BLOCK:
         heads, _ = _whole_blocks(data)
         if len(heads):
@@ -158,7 +158,7 @@ def _first_block(file: BinaryIO) -> NDArray[Any] | None:
 
 
 def _find_last(file: BinaryIO) -> float:
-    """When the last whole block begins, s of the device's clock."""
+    """Start of the last complete block, s of the device's clock."""
     size = file.seek(0, 2)
     blocks = max(0, (size - HEADER) // BLOCK)
     file.seek(max(HEADER, HEADER + (blocks - TAIL) * BLOCK))
@@ -167,7 +167,7 @@ def _find_last(file: BinaryIO) -> float:
 
 
 def _whole_blocks(data: bytes) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Heads and bytes (b, 512) of the blocks of which every byte is as it was written."""
+    """Headers and bytes (b, 512) of the intact blocks."""
     count = len(data) // BLOCK
     raw = np.frombuffer(data, np.uint8, count * BLOCK).reshape(count, BLOCK)
     heads = np.frombuffer(data, _BLOCK, count)
@@ -178,7 +178,7 @@ def _whole_blocks(data: bytes) -> tuple[NDArray[Any], NDArray[np.uint8]]:
 
 
 def _starts(heads: NDArray[Any]) -> Floats:
-    """When the first sample of every block (b,) was taken, s since 1970 of the device's clock."""
+    """Time of the first sample of every block (b,), s since 1970 of the device's clock."""
     clock = heads["clock"].astype(np.int64)
     months = ((clock >> 26) + 30) * 12 + ((clock >> 22) & 15) - 1
     days = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64) + ((clock >> 17) & 31) - 1
@@ -193,7 +193,7 @@ def _starts(heads: NDArray[Any]) -> Floats:
 
 
 def _read_blocks(source: str, opener: Opener, origin_s: float) -> Iterator[SampleBlock]:
-    """Samples from the start; a block that is damaged is a hole."""
+    """Samples from the start; damaged blocks are gaps."""
     with opener() as file:
         file.seek(HEADER)
         held = b""  # the last whole block: how long it lasts shows the one behind it
@@ -209,7 +209,7 @@ def _read_blocks(source: str, opener: Opener, origin_s: float) -> Iterator[Sampl
 
 
 def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decoded:
-    """Samples of whole blocks of one kind."""
+    """Samples of complete blocks of one kind."""
     if any((heads[name] != heads[name][0]).any() for name in ("axes", "rate")):
         raise FormatError(
             "bad_cwa",
@@ -240,7 +240,7 @@ def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decode
 
 
 def _select(values: NDArray[Any], there: NDArray[np.bool_] | None) -> NDArray[Any]:
-    """Samples (n, 3) of blocks (b, room, 3), those that are there; None = all are."""
+    """Existing samples (n, 3) of blocks (b, room, 3); None = all of them."""
     return values.reshape(-1, 3) if there is None else values[there]
 
 
@@ -255,7 +255,7 @@ def _unpack(words: NDArray[np.uint32]) -> NDArray[np.int32]:
 
 
 def _time(blocks: _Decoded, number: int, rate: float, origin_s: float) -> SampleBlock:
-    """The samples of the first `number` blocks at their times: even between two clock readings."""
+    """The samples of the first `number` blocks with their times: evenly spaced between two clock readings."""
     count = blocks.count[:number]
     nominal = count / rate
     lasts = nominal.copy()

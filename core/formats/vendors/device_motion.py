@@ -1,8 +1,8 @@
-"""A phone's DeviceMotion events as JSON (docs/reference/formats.md, "Phone").
+"""DeviceMotion events of a phone as JSON (docs/reference/formats.md, "Phone").
 
-Acceleration with gravity in m/s², rotation rate in deg/s. Browsers disagree on which axis alpha, beta and
-gamma turn about; gravity decides: it must turn as the rates say, ġ = −ω × g. That holds for either sign of
-it, on which they disagree too, so what was taken is said.
+Acceleration with gravity in m/s², rotation rate in deg/s. Browsers disagree on the axes of alpha, beta and
+gamma; the correct assignment is found from gravity, which must rotate with the rates, ġ = −ω × g. That holds
+for either sign of gravity, on which browsers disagree too, so the assumption is reported.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ _CLOCKS: Final = ("t_ms", "timeStamp", "timestamp")
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell DeviceMotion events by the browser's name for acceleration."""
+    """Whether the data contain the DeviceMotion name of acceleration."""
     return data.lstrip()[:1] in (b"{", b"[") and _MARK in data[:65536]
 
 
 def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draft, ...]:
-    """Read the phone.
+    """Read the events of the phone.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _signs(device: str, source: str) -> Notice:
-    """Nothing in the events tells the sign; the wrong one exchanges left and right of a phone worn alone."""
+    """Notice on the assumed sign of acceleration; the wrong one swaps left and right of a single phone."""
     turned = json.dumps({"corrections": {device: {"acc_axes": AGAINST}}}, ensure_ascii=False)
     return Notice(
         SIGN_ASSUMED,
@@ -114,27 +114,29 @@ def _signs(device: str, source: str) -> Notice:
 
 
 def _times(events: Sequence[dict[str, Any]]) -> Floats:
-    """When every event was, s by the first clock that any event has."""
+    """Time of every event, s by the first available clock."""
     clocks = (_numbers([e.get(name) for e in events]) * _MILLI for name in _CLOCKS)
     return next((t for t in clocks if np.isfinite(t).any()), np.full(len(events), np.nan))
 
 
 def _vectors(events: Sequence[dict[str, Any]], name: str, parts: tuple[str, str, str]) -> Floats:
-    """Three numbers (n, 3) of every event; NaN where it has none."""
+    """Three numbers (n, 3) of every event; NaN if missing."""
     x, y, z = parts
     found = [e.get(name) or {} for e in events]
     return _numbers([v for f in found for v in (f.get(x), f.get(y), f.get(z))]).reshape(-1, 3)
 
 
 def _numbers(values: Sequence[float | None]) -> Floats:
-    """Numbers with NaN for what is missing, or what no sensor and no clock gives."""
+    """Numbers with NaN for missing ones and values impossible for sensors and clocks."""
     out = np.array(values, np.float64)
     out[~(np.abs(out) < text.LARGEST)] = np.nan
     return out
 
 
 def _find_order(t_s: Floats, acc: Floats, rates: Floats) -> tuple[str, bool]:
-    """The reading of the rates that turns gravity as measured, and whether the others clearly do not."""
+    """The axis order of the rates that is consistent with gravity, and whether all others are clearly
+    inconsistent.
+    """
     first = next(iter(_ORDERS))
     good = np.isfinite(t_s) & np.isfinite(acc).all(axis=1) & np.isfinite(rates).all(axis=1)
     t, g, w = t_s[good], acc[good], rates[good]

@@ -1,5 +1,4 @@
-"""Xsens and Movella DOT: the CSV that the DOT app and its SDK write (docs/reference/formats.md, "Movella
-DOT").
+"""Xsens and Movella DOT: CSV of the DOT app and its SDK (docs/reference/formats.md, "Movella DOT").
 
 A line "sep=,", lines "key:,value", a blank line, a header line, then rows: one file per sensor. Acceleration
 in m/s² and angular rate in deg/s in the sensor's axes, orientation sensor → earth; the clock counts µs with
@@ -38,7 +37,7 @@ _EVERYBODYS: Final = {"", "xsens dot", "movella dot"}
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell a DOT file by its lines of keys."""
+    """Whether the data begin with the key lines of a DOT file."""
     head = data[:4096]
     return b"DeviceTag:" in head and _COUNTER.encode() in head
 
@@ -92,7 +91,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _read_keys(lines: Sequence[bytes], separator: bytes, source: str) -> tuple[int, dict[str, str]]:
-    """Which line is the header, and what the lines before it say by key."""
+    """Index of the header line, and values by key from the lines before it."""
     at = next(
         (i for i, line in enumerate(lines) if _COUNTER in text.split(line, separator) and b":" not in line),
         None,
@@ -110,7 +109,7 @@ def _read_keys(lines: Sequence[bytes], separator: bytes, source: str) -> tuple[i
 def _read_clock(
     table: text.Columns, says: Mapping[str, str], source: str
 ) -> tuple[str, Floats, float, tuple[Notice, ...]]:
-    """Kind of clock, its ticks, after how many it starts again, and what is to be said of it."""
+    """Kind of clock, its ticks, its wrap, and notices."""
     fine = table.values.get(_FINE)
     if fine is None or not np.isfinite(fine).any():
         return "counter", table.values[_COUNTER], float(WRAP_32), ()
@@ -121,7 +120,7 @@ def _read_clock(
 
 
 def _device(says: Mapping[str, str], source: str) -> str:
-    """The sensor's tag where a person gave it one, else the file's name."""
+    """The user-assigned tag of the sensor, else the file's name."""
     tag = says.get("devicetag", "")
     return stem_of(source) if tag.lower() in _EVERYBODYS else tag
 

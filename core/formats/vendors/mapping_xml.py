@@ -1,4 +1,4 @@
-"""OpenSense mapping files (XsensDataReaderSettings): which sensor is worn on which segment."""
+"""OpenSense mapping files (XsensDataReaderSettings): assignment of sensors to segments."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from sagittal.core.frames import Segment
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell an OpenSense mapping by its element names."""
+    """Whether the data have the element names of an OpenSense mapping."""
     return data.lstrip()[:1] == b"<" and b"<ExperimentalSensor " in data
 
 
 def read(data: bytes, source: str) -> dict[str, Segment | None]:
-    """Sensor id → segment; models with bodies that we do not know (hands) map to None.
+    """Sensor id → segment; unsupported bodies (hands) map to None.
 
     Raises
     ------
-    FormatError
-        bad_xml (not well formed, or with entities, which are refused).
+    FormatError bad_xml (not well formed, or with entities, which are rejected).
     """
     try:
         root = fromstring(data, forbid_dtd=True)

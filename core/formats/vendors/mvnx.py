@@ -1,8 +1,9 @@
 """Xsens MVNX: XML of MVN and Xsens Analyze, version 4 (docs/reference/formats.md, "MVNX").
 
-It holds no raw inertial signals. Orientation R (sensor → a frame whose z is up) and free acceleration a (in
-that frame, m/s²) give the acceleration back, Rᵀ(a + g e_z); the angular rate is what turns one orientation
-into the next: the mean over the intervals before and behind a frame, so fast turns are a little flattened.
+It holds no raw inertial signals. Specific force is reconstructed from orientation R (sensor → a frame with z
+up) and free acceleration a (in that frame, m/s²) as Rᵀ(a + g e_z); the angular rate from consecutive
+orientations as the mean over the intervals before and after a frame, which slightly attenuates fast
+rotations.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ _AGAIN: Final = "Export it from MVN again with sensor data switched on."
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell MVNX by its root element."""
+    """Whether the root element is that of MVNX."""
     return data.lstrip()[:1] == b"<" and b"<mvnx" in data[:4096]
 
 
@@ -40,7 +41,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
     Raises
     ------
-    FormatError `bad_xml` (not well formed, or with a DTD, which is refused), `missing_acc`, `empty`.
+    FormatError `bad_xml` (not well formed, or with a DTD, which is rejected), `missing_acc`, `empty`.
     """
     reader = _Reader(source)
     parser = expat.ParserCreate()
@@ -77,7 +78,7 @@ class _Reader:
         self._depth = 0
 
     def begin(self, tag: str, given: Mapping[str, str]) -> None:
-        """An element begins."""
+        """Handle the start of an element."""
         name = tag.rsplit(":", 1)[-1] if ":" in tag else tag
         if self._frame is not None:
             self._depth += 1
@@ -95,12 +96,12 @@ class _Reader:
             self._rate = _number(given.get("frameRate"))
 
     def add_text(self, content: str) -> None:
-        """Text of the innermost element."""
+        """Handle text of the innermost element."""
         if self._part is not None:
             self._part.append(content)
 
     def end(self, tag: str) -> None:
-        """An element ends."""
+        """Handle the end of an element."""
         if self._frame is None:
             return
         self._part = None
@@ -198,14 +199,14 @@ def _columns(name: str, sensor: int) -> list[str]:
 
 
 def _unit(q: Floats) -> Floats:
-    """Unit quaternions, NaN where none is given."""
+    """Unit quaternions, NaN if missing."""
     norm = np.linalg.norm(q, axis=-1, keepdims=True)
     good = (norm > 0.9) & (norm < 1.1)
     return np.where(good, q / np.where(good, norm, 1.0), np.nan)
 
 
 def _rates(q: Floats, index: Floats, rate_hz: float) -> Floats:
-    """Angular rate (n, 3) rad/s in the sensor's axes, by the steps before and after each frame."""
+    """Angular rate (n, 3) rad/s in the sensor's axes, from the steps before and after each frame."""
     rates = np.full((len(q), 3), np.nan)
     if len(q) < 2:
         return rates

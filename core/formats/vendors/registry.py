@@ -1,4 +1,4 @@
-"""Sensor formats that say everything themselves and need no manifest: one entry each, found by content."""
+"""Self-describing sensor formats that need no manifest: one entry each, detected by content."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sagittal.core.formats.vendors import apdm, apdm_h5, cwa, device_motion, dot
 
 @dataclass(frozen=True)
 class VendorFormat:
-    """A reader of one format.
+    """A reader for one format.
 
     Parameters
     ----------
-    label : name for people. looks_like : tells a file by its bytes, never by its name; text comes as UTF-8.
-    read : bytes, name of the file, what a manifest says of it → its sensors in SI units; raises FormatError.
-    one_sensor : a file holds one sensor of a take, the others are in files beside it.
+    label : display name. looks_like : detects a file by its bytes, never by its name; text is passed as
+        UTF-8. read : bytes, name of the file, its manifest entry → its sensors in SI units; raises
+        FormatError. one_sensor : a file contains one sensor of a recording, the others are in separate files.
     """
 
     label: str
@@ -47,12 +47,12 @@ VENDOR_FORMATS: Final[list[VendorFormat]] = [
 
 
 def find_vendor(data: bytes) -> VendorFormat | None:
-    """The format of a file, None where no entry knows it."""
+    """The format of a file, None if no entry matches."""
     return next((vendor for vendor in VENDOR_FORMATS if vendor.looks_like(data)), None)
 
 
 def list_formats() -> str:
-    """Everything that is read, as a sentence about an unreadable upload lists it."""
+    """All supported formats as a list for messages about unreadable uploads."""
     labels = (vendor.label for vendor in VENDOR_FORMATS)
     return ", ".join(
         (*labels, "BIDS motion", "CSV or TSV with a manifest", "Sagittal Parquet", "Sagittal live log")

@@ -1,7 +1,7 @@
-"""Shimmer: CSV that Consensys writes (docs/reference/formats.md, "Shimmer Consensys").
+"""Shimmer: CSV written by Consensys (docs/reference/formats.md, "Shimmer Consensys").
 
 A line "sep=,", a line of names like Shimmer_952D_Accel_LN_X_CAL, a line of units, then rows that end with a
-separator. Time in ms; of the two accelerometers the low-noise one is read while it stays within its ±2 g.
+separator. Time in ms; of the two accelerometers the low-noise one is used while it stays within its ±2 g.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _LOW_NOISE_FULL: Final = 1.98 * GRAVITY
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell a Consensys export by the names of its columns."""
+    """Whether the column names are those of a Consensys export."""
     return any(_parse(text.split(line, _separator(data))) for line in text.head_lines(data[:65536], _HEAD))
 
 
@@ -68,13 +68,13 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 
 def _separator(data: bytes) -> bytes:
-    """What the first line, "sep=,", names, else a tab where it has one, else a comma."""
+    """Separator named in the first line, "sep=,", else a tab if it contains one, else a comma."""
     first = data[:4096].split(b"\n", 1)[0]
     return text.read_separator(first) or (b"\t" if b"\t" in first else b",")
 
 
 def _parse(names: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Device → what a column holds ("Gyro_X") → its name, calibrated columns before all others."""
+    """Device → quantity ("Gyro_X") → column name, calibrated columns only."""
     out: dict[str, dict[str, str]] = {}
     for name in names:
         found = _NAME.fullmatch(name)
@@ -146,7 +146,7 @@ def _sensor(
 
 
 def _choose(fine: Floats | None, wide: Floats | None, source: str) -> tuple[Floats | None, list[Notice]]:
-    """The low-noise accelerometer, the wide-range one where the other reaches its end."""
+    """The low-noise accelerometer, replaced by the wide-range one where it saturates."""
     if fine is None or wide is None:
         return (wide if fine is None else fine), []
     if not np.isfinite(fine).any() or (np.abs(fine) > _LOW_NOISE_FULL).any():

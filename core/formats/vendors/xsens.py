@@ -2,7 +2,7 @@
 per sensor.
 
 Comment lines ("//"), one header line, then rows separated by tab, comma, semicolon or space. Any subset of
-the columns may be there; blank or "NaN" cells are missing; the packet counter has 16 bit.
+the columns may be present; blank or "NaN" cells are missing; the packet counter has 16 bit.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _TICK_S: Final = 1e-4
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the table starts and how it is cut."""
+    """Start and layout of the table."""
 
     comments: list[bytes]
     names: list[str]
@@ -49,7 +49,7 @@ class _Layout:
 
 
 def looks_like(data: bytes) -> bool:
-    """Tell an MT Manager export by its header line."""
+    """Whether the data contain the header line of an MT Manager export."""
     return _layout(data) is not None
 
 
@@ -73,13 +73,12 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
 
     Parameters
     ----------
-    data : UTF-8 text. spec : entry of the manifest for this file; overrides the rate, and units that the
-        exporting software changed.
+    data : UTF-8 text. spec : entry of the manifest for this file; overrides the rate, and units changed by
+        the exporting software.
 
     Raises
     ------
-    FormatError
-        empty, missing_acc, gravity_removed, collapsed_columns, bad_table, ambiguous_column.
+    FormatError empty, missing_acc, gravity_removed, collapsed_columns, bad_table, ambiguous_column.
     """
     layout = _layout(data)
     if layout is None:
@@ -130,7 +129,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
 def _stack_known(
     table: text.Columns, group: tuple[str, ...], groups: list[tuple[str, ...]], factor: float = 1.0
 ) -> Floats | None:
-    """The columns of a signal side by side; None where the file has none or no value in them."""
+    """The columns of a signal as an array; None if absent or without any value."""
     if group not in groups:
         return None
     signal = table.stack(group) * factor
@@ -147,7 +146,7 @@ def _no_gyr(source: str, device: str) -> Notice:
 
 
 def cut_notice(source: str, cut: bool) -> list[Notice]:
-    """Notice about a last line that ends in the middle of a number."""
+    """Notice about a last line truncated in the middle of a number."""
     if not cut:
         return []
     return [
@@ -162,7 +161,9 @@ def cut_notice(source: str, cut: bool) -> list[Notice]:
 def _row_names(
     body: memoryview, first: bytes, layout: _Layout, source: str, device: str
 ) -> tuple[memoryview, list[str]]:
-    """Names of a row's cells; it may have a trailing separator or (spaces) have lost its blank cells."""
+    """Names for a row's cells; it may have a trailing separator or (with spaces) have lost its blank
+    cells.
+    """
     names, separator = layout.names, layout.separator
     cells = first.count(separator) + 1
     if separator == b" " and cells != len(names):
@@ -176,7 +177,9 @@ def _row_names(
 
 
 def _right_aligned(names: list[str], cells: int, source: str, device: str) -> list[str]:
-    """Assume the lost cells are the blank time columns right after the counter, or refuse."""
+    """Assume that the missing cells are the blank time columns right after the counter, or reject the
+    file.
+    """
     lost = names[1 : 1 + len(names) - cells]
     if names[0] == "PacketCounter" and all(_TIME.match(n) for n in lost):
         return [names[0], *names[1 + len(lost) :]]
@@ -189,9 +192,9 @@ def _right_aligned(names: list[str], cells: int, source: str, device: str) -> li
 
 
 def _without_cut_end(body: memoryview, separator: bytes) -> tuple[memoryview, bool]:
-    """Drop a last line without line end whose last number has fewer decimals than the line before.
+    """Drop a last line without line end whose last number has fewer decimals than in the previous line.
 
-    MT Manager writes six decimals everywhere, so a shorter number was cut off while writing or copying.
+    MT Manager always writes six decimals, so a shorter number was truncated while writing or copying.
     """
     tail = bytes(body[-20_000:])
     if tail.endswith(b"\n") or b"\n" not in tail:
@@ -254,7 +257,7 @@ def _factor(units: dict[str, float], unit: str | None) -> float:
 
 
 def _orientation(table: text.Columns, groups: list[tuple[str, ...]]) -> Floats | None:
-    """The vendor's orientation, sensor → ENU, in whatever form it was exported."""
+    """The vendor's orientation, sensor → ENU, from any of its export forms."""
     if _QUAT in groups:
         return table.stack(_QUAT)
     if _MAT in groups:

@@ -1,7 +1,7 @@
-"""Scores of filters on recordings with a reference orientation, as the BROAD benchmark defines them.
+"""Scores of filters on recordings with a reference orientation, as defined by the BROAD benchmark.
 
-Laidig, Caruso, Cereatti and Seel 2021: the error q_ref ⊗ q* in the world is split into a turn about the
-vertical (heading) and the rest (inclination); the score is the RMS over the moving phase.
+Laidig, Caruso, Cereatti and Seel 2021: the error q_ref ⊗ q* in the world is decomposed into a rotation about
+the vertical (heading) and the rest (inclination); the score is the RMS over the movement phase.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from sagittal.core.frames import Bools, Floats
 from sagittal.core.fusion.algorithms.filter import FusionFilter, RestMeans
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.self_calibrating import SelfCalibratingFilter
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, multiply, split_heading
 
 REST_S: Final = 1.0
@@ -44,8 +45,8 @@ class ReferenceTrial:
 
     Parameters
     ----------
-    gyr, acc, mag : (n, 3) rad/s, m/s² and any unit, mag NaN where there is none. reference : (n, 4) sensor
-    to world, NaN where it was lost. moving : (n,) the phase that is scored.
+    gyr, acc, mag : (n, 3) rad/s, m/s² and any unit, mag NaN if missing. reference : (n, 4) sensor to world,
+        NaN where lost. moving : (n,) the phase to score.
     """
 
     name: str
@@ -58,17 +59,17 @@ class ReferenceTrial:
 
     @property
     def scored(self) -> Bools:
-        """Samples (n,) of the moving phase that have a reference."""
+        """Samples (n,) of the movement phase with a reference."""
         return np.asarray(self.moving & np.isfinite(self.reference).all(axis=1))
 
     @property
     def has_magnetometer(self) -> bool:
-        """Whether any sample of it is a number."""
+        """Whether there is any magnetometer sample."""
         return bool(np.isfinite(self.mag).any())
 
     @property
     def sha256(self) -> str:
-        """Digest of the rate and all samples, whatever file they came in."""
+        """Digest of the rate and all samples, independent of the file."""
         found = hashlib.sha256(repr(self.rate_hz).encode())
         for array in (self.gyr, self.acc, self.mag, self.reference, self.moving):
             found.update(array.tobytes())
@@ -89,7 +90,7 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
 
     Raises
     ------
-    FormatError `not_a_trial` where arrays are missing, or are not the numbers that they should be.
+    FormatError `not_a_trial` if arrays are missing or have invalid contents.
     """
     try:
         with np.load(BytesIO(content), allow_pickle=False) as file:
@@ -97,17 +98,30 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
     except _UNREADABLE as error:
         raise FormatError(
             "not_a_trial",
-            f"{name} does not hold imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate.",
+            Message(
+                "{name} does not hold imu_gyr, imu_acc, imu_mag, opt_quat, movement, sampling_rate.",
+                name=name,
+            ),
         ) from error
     if wrong := [key for key, array in found.items() if array.dtype.kind not in "fiub"]:
-        raise FormatError("not_a_trial", f"{name}: {', '.join(wrong)} are no numbers.")
+        raise FormatError(
+            "not_a_trial", Message("{name}: {wrong} are no numbers.", name=name, wrong=", ".join(wrong))
+        )
     n = found["movement"].size
     if not n or found["movement"].shape != (n,) or any(found[k].shape != (n, d) for k, d in _SHAPES.items()):
-        raise FormatError("not_a_trial", f"{name}: arrays of different lengths, or without samples.")
+        raise FormatError(
+            "not_a_trial", Message("{name}: arrays of different lengths, or without samples.", name=name)
+        )
     rate = found["sampling_rate"]
     if rate.size != 1 or not _RATES[0] <= rate.item() <= _RATES[1]:
         raise FormatError(
-            "not_a_trial", f"{name}: sampling_rate is one number of {_RATES[0]:g} to {_RATES[1]:g} Hz."
+            "not_a_trial",
+            Message(
+                "{name}: sampling_rate is one number of {RATES:g} to {RATES2:g} Hz.",
+                name=name,
+                RATES=_RATES[0],
+                RATES2=_RATES[1],
+            ),
         )
     gyr, acc, mag, reference = (np.array(found[key], np.float64, order="C") for key in _SHAPES)
     norm = np.linalg.norm(reference, axis=1)
@@ -116,15 +130,22 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
 
 
 def find_rest(trial: ReferenceTrial, *, with_bias: bool = False) -> RestMeans:
-    """Means over the rest before the movement; `with_bias` leaves the gyroscope's in.
+    """Means over the rest before the movement; `with_bias` keeps the gyroscope bias.
 
     Raises
     ------
-    SignalError `no_rest` where it is shorter than a second.
+    SignalError `no_rest` if it is shorter than a second.
     """
     first = int(np.argmax(trial.moving)) if trial.moving.any() else len(trial.moving)
     if first < REST_S * trial.rate_hz:
-        raise SignalError("no_rest", f"{trial.name} has less than {REST_S:g} s of rest before the movement.")
+        raise SignalError(
+            "no_rest",
+            Message(
+                "{name} has less than {REST_S:g} s of rest before the movement.",
+                name=trial.name,
+                REST_S=REST_S,
+            ),
+        )
     acc, gyr, mag = (x[:first, None] for x in (trial.acc, trial.gyr, trial.mag))
     rest = RestMeans.over(acc, gyr, mag if trial.has_magnetometer else None)
     return RestMeans(rest.acc, np.zeros((1, 3)), rest.mag) if with_bias else rest
@@ -138,7 +159,7 @@ def run_trial(
     with_bias: bool = False,
     magnetometer: bool | None = None,
 ) -> Floats:
-    """Orientations (n, 4) of a trial by one algorithm, started from the rest before the movement.
+    """Orientations (n, 4) of a trial from one algorithm, initialised with the rest before the movement.
 
     Parameters
     ----------
@@ -150,14 +171,16 @@ def run_trial(
 
 
 def run_own(trial: ReferenceTrial, *, both_ways: bool) -> Floats:
-    """Orientations (n, 4) by the self-calibrating filter, which finds its start and the bias itself."""
+    """Orientations (n, 4) from the self-calibrating filter, which estimates its initial state and the bias
+    itself.
+    """
     signals = trial.gyr[:, None], trial.acc[:, None], trial.mag[:, None]
     run = SelfCalibratingFilter(trial.rate_hz, magnetometer=True)
     return np.asarray((run.smooth if both_ways else run.advance)(*signals)[:, 0])
 
 
 def score_orientation(q: Floats, trial: ReferenceTrial) -> OrientationScore:
-    """RMS errors of orientations (n, 4) over the moving phase where there is a reference."""
+    """RMS errors of orientations (n, 4) over the movement phase with a reference."""
     part = trial.scored
     return score_error(multiply(trial.reference[part], conjugate(q[part])))
 

@@ -1,4 +1,4 @@
-"""Every filter that can be asked for by name: the published ones and the project's own."""
+"""All selectable filters: the published ones and those of this project."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from typing import Final
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.fusion.algorithms.listed import ALGORITHMS, BY_NAME
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
 class OwnFilter:
-    """The project's own self-calibrating filter beside the published ones; `both_ways`: after the take."""
+    """The project's self-calibrating filter, in addition to the published ones; `both_ways`: smoothed,
+    offline only.
+    """
 
     name: str
     label: str
@@ -29,7 +32,7 @@ LABELS: Final[dict[str, str]] = {a.name: a.shown for a in ALGORITHMS} | {o.name:
 
 
 def require_filters(names: Sequence[str]) -> None:
-    """Refuse a choice of filters that names none, or one that is not listed.
+    """Reject an empty selection of filters, or an unknown filter.
 
     Raises
     ------
@@ -39,11 +42,13 @@ def require_filters(names: Sequence[str]) -> None:
         raise ParameterError("no_filter", "No filter was chosen; choose at least one.")
     unknown = next((name for name in names if name not in LABELS), None)
     if unknown is not None:
-        raise ParameterError("no_such_algorithm", f"There is no filter '{unknown}'; see the list.")
+        raise ParameterError(
+            "no_such_algorithm", Message("There is no filter '{unknown}'; see the list.", unknown=unknown)
+        )
 
 
 def require_tunable(name: str) -> None:
-    """Refuse a filter that is not listed, or has no gains to fit: the project's own estimates its own.
+    """Reject an unknown filter, or one without gains to fit: the project's own estimates its parameters.
 
     Raises
     ------
@@ -52,9 +57,10 @@ def require_tunable(name: str) -> None:
     if any(name == own.name for own in OWN):
         raise ParameterError(
             "nothing_to_tune",
-            f"'{name}' calibrates itself, it has no gains to fit; choose a published one.",
+            Message("'{name}' calibrates itself, it has no gains to fit; choose a published one.", name=name),
         )
     if name not in BY_NAME:
         raise ParameterError(
-            "no_such_algorithm", f"There is no filter '{name}' to tune; GET /api/v1/filters lists them."
+            "no_such_algorithm",
+            Message("There is no filter '{name}' to tune; GET /api/v1/filters lists them.", name=name),
         )

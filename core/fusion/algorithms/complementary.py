@@ -1,8 +1,8 @@
-"""Engine E1: one quaternion, turned by the gyroscope and then corrected by one of twelve correctors.
+"""Engine E1: one quaternion, integrated from the gyroscope and then corrected by one of twelve correctors.
 
-Every corrector sees the orientation that the gyroscope has already brought to the sample. Equations, and
-what differs from the papers: docs/science/filters.md, "E1 Complementary filters". Vectors are single numbers
-here: they stay in registers, which halves the time.
+Every corrector starts from the orientation already propagated to the sample. Equations, and differences from
+the papers: docs/science/filters.md, "E1 Complementary filters". Vectors are separate scalars here: they stay
+in registers, which halves the time.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def run_complementary(kind, gyr, acc, mag, dt, m_ref, rows, constants, state, ou
 
     Parameters
     ----------
-    gyr, acc, mag : (n, S, 3) rad/s, and shares of the norm at rest; NaN where there is none. m_ref : (S, 3)
+    gyr, acc, mag : (n, S, 3) rad/s, and relative to the norm at rest; NaN if missing. m_ref : (S, 3)
     unit field of the world. rows : (g, 42) gains. constants : (c,). state : (S, SIZE). out : (n, S, 4).
     """
     w, a, m = np.empty(3), np.empty(3), np.empty(3)
@@ -121,7 +121,7 @@ def run_complementary(kind, gyr, acc, mag, dt, m_ref, rows, constants, state, ou
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _cross_to(q, v, x, y, z):  # type: ignore[no-untyped-def]
-    """v × R(q)ᵀ (x, y, z): the turn that brings a direction of the world onto the measured v (3,)."""
+    """v × R(q)ᵀ (x, y, z): the rotation that aligns a direction of the world with the measured v (3,)."""
     i, j, k = turn_to_sensor(q, x, y, z)
     return v[1] * k - v[2] * j, v[2] * i - v[0] * k, v[0] * j - v[1] * i
 
@@ -141,7 +141,7 @@ def _cross(q, b, a, m, has_a, has_m, r, kp, ki, dt):  # type: ignore[no-untyped-
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _hua(q, b, a, m, has_a, has_m, r, c, dt):  # type: ignore[no-untyped-def]
-    """Hua 2014: the magnetometer turns about the estimated vertical only; the bias is bounded."""
+    """Hua 2014: the magnetometer rotates about the estimated vertical only; the bias is bounded."""
     u, v, w = turn_to_sensor(q, 0.0, 0.0, 1.0)
     x, y, z, turn = 0.0, 0.0, 0.0, 0.0
     if has_a:
@@ -191,9 +191,9 @@ def _gradient(q, b, a, m, has_a, has_m, beta, zeta, dt):  # type: ignore[no-unty
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _least_squares(q, a, m, has_a, has_m, ref, k_a, k_m, beta, use_cross):  # type: ignore[no-untyped-def]
-    """Fourati 2011 (Levenberg–Marquardt); with `use_cross` of a × m instead of m (Michel 2017).
+    """Fourati 2011 (Levenberg–Marquardt); with `use_cross` a × m instead of m (Michel 2017).
 
-    Both sides of the least squares carry the weights k, so that k = 0 takes a sensor out.
+    Both sides of the least squares are weighted by k, so that k = 0 disables a sensor.
     """
     n00, n01, n02, n11, n12, n22 = DAMPING, 0.0, 0.0, DAMPING, 0.0, DAMPING
     g0, g1, g2 = 0.0, 0.0, 0.0
@@ -234,7 +234,7 @@ def _least_squares(q, a, m, has_a, has_m, ref, k_a, k_m, beta, use_cross):  # ty
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _small_angles(q, a, m, has_a, has_m, r, g_a, g_m):  # type: ignore[no-untyped-def]
-    """Justa 2020, linear law: (1, ½ σ a × â) and (1, ½ σ m × m̂), one after the other."""
+    """Justa 2020, linear law: (1, ½ σ a × â) and (1, ½ σ m × m̂), applied in sequence."""
     if has_a:
         x, y, z = _cross_to(q, a, 0.0, 0.0, 1.0)
         c = 0.5 * g_a
@@ -248,9 +248,9 @@ def _small_angles(q, a, m, has_a, has_m, r, g_a, g_m):  # type: ignore[no-untype
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _interpolate(w, x, y, z, share):  # type: ignore[no-untyped-def]
-    """A rotation (w, x, y, z), w ≥ 0, taken by a share: linearly when it is small, else along the arc.
+    """A fraction of a rotation (w, x, y, z), w ≥ 0: linear interpolation if it is small, else along the arc.
 
-    Its length is not 1 where it is linear.
+    The linear result is not normalised.
     """
     if w > STRAIGHT:
         return 1.0 - share + share * w, share * x, share * y, share * z
@@ -267,7 +267,7 @@ def _turn_world(q, w, x, y, z):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _halve_heading(q, m):  # type: ignore[no-untyped-def]
-    """Cosine and sine of half the turn about the vertical that lets m (3,) point north (+y)."""
+    """Cosine and sine of half the rotation about the vertical that makes m (3,) point north (+y)."""
     x, y, _ = turn_to_world(q, m[0], m[1], m[2])
     across = sqrt(x * x + y * y)
     if across == 0.0:
@@ -281,7 +281,7 @@ def _halve_heading(q, m):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _algebraic(q, b, last, w, a, m, has_a, has_m, deviation, rate, share_m, c):  # type: ignore[no-untyped-def]
-    """Valenti 2015 (AQUA): tilt by the shortest arc, then heading, each taken by a share."""
+    """Valenti 2015 (AQUA): tilt by the shortest arc, then heading, a fraction of each."""
     if has_a:
         u, v, t, _ = scale_to_unit(a[0], a[1], a[2])
         x, y, z = turn_to_world(q, u, v, t)
@@ -307,7 +307,9 @@ def _algebraic(q, b, last, w, a, m, has_a, has_m, deviation, rate, share_m, c): 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _tilt_then_heading(q, a, m, has_a, has_m, share_a, share_m):  # type: ignore[no-untyped-def]
-    """Del Rosario 2016 (reconstruction): a share of the tilt error, then a share of the heading error."""
+    """Del Rosario 2016 (reconstruction): a fraction of the tilt error, then a fraction of the heading
+    error.
+    """
     if has_a:
         x, y, z = turn_to_world(q, a[0], a[1], a[2])
         across = sqrt(x * x + y * y)
@@ -331,7 +333,7 @@ def _move_to(q, w, x, y, z, gain, farthest):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _fixed_point(q, a, m, has_a, has_m, g, c):  # type: ignore[no-untyped-def]
-    """Wu 2016 (FCF): q ← q + ½ γ (W − 1) q for the vertical, then for the field, unless far off."""
+    """Wu 2016 (FCF): q ← q + ½ γ (W − 1) q for the vertical, then for the field, unless too far off."""
     if not has_a:
         return
     h0, h1, h2, h3 = observe_turn(0.0, 0.0, 1.0, a[0], a[1], a[2], q)
@@ -363,10 +365,11 @@ def _linear(q, a, m, has_a, has_m, ref, c, scale):  # type: ignore[no-untyped-de
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _wahba(q, a, m, has_a, has_m, ref, w_a, w_m, total):  # type: ignore[no-untyped-def]
-    """Marantos 2016 (reconstruction): the rotation nearest to a weighted sum of prediction and references.
+    """Marantos 2016 (reconstruction): the rotation closest to a weighted sum of prediction and references.
 
     Its quaternion is the first eigenvector of Davenport's matrix K = 4 w (q qᵀ) + w_a W_a + w_m W_m (+ a
-    multiple of 1), w the weight of the prediction: found by powers of K, each closer by (w_a + w_m) / w.
+    multiple of 1), w the weight of the prediction: found by power iteration, each step converging by (w_a +
+    w_m) / w.
     """
     w_a, w_m = w_a if has_a else 0.0, w_m if has_m else 0.0
     held = 4.0 * (total - w_a - w_m)

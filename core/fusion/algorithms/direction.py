@@ -1,4 +1,4 @@
-"""Engine E6: filters of directions as the sensor sees them, from which the orientation is put together.
+"""Engine E6: filters of directions in sensor axes, from which the orientation is constructed.
 
 Equations: docs/science/filters.md, "E6 Direction filters".
 """
@@ -41,7 +41,7 @@ BIAS: Final = 4
 
 
 def start_state(kind: str, q: Floats, up: Floats, field: Floats, constants: Floats) -> Floats:
-    """State (SIZE,) at an orientation q (4,) with vertical and field (3,) as the sensor sees them."""
+    """State (SIZE,) at an orientation q (4,) with vertical and field (3,) in sensor axes."""
     if kind == "vertical":
         first, second = (constants[P_DCM], constants[P_B]), (0.0, 0.0)
     else:
@@ -105,7 +105,7 @@ def run_direction(kind, gyr, acc, mag, dt, m_ref, rows, constants, state, out): 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _turn_back(turn, E):  # type: ignore[no-untyped-def]
-    """Write Exp(−turn) (3, 3): how a direction of the world moves in the sensor."""
+    """Write Exp(−turn) (3, 3): the motion of a world direction in sensor axes."""
     h, i, j, k = half_turn(turn[0], turn[1], turn[2])
     E[0, 0], E[0, 1], E[0, 2] = 1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j + h * k), 2.0 * (i * k - h * j)
     E[1, 0], E[1, 1], E[1, 2] = 2.0 * (i * j - h * k), 1.0 - 2.0 * (i * i + k * k), 2.0 * (j * k + h * i)
@@ -114,7 +114,9 @@ def _turn_back(turn, E):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _advance_vector(x, P, E, V, angle, c, s, work):  # type: ignore[no-untyped-def]
-    """Ligorio 2015: g turns with the sensor, with noise σ_G T across it; its disturbance decays by c."""
+    """Ligorio 2015: g rotates with the sensor, with noise σ_G T perpendicular to it; its disturbance
+    decays by c.
+    """
     for i in range(3):
         work[0, i] = E[i, 0] * x[0] + E[i, 1] * x[1] + E[i, 2] * x[2]
         x[3 + i] *= c
@@ -178,7 +180,7 @@ def _advance_vertical(x, P, E, V, dt, sigma_g, s_b):  # type: ignore[no-untyped-
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _take_vertical(x, P, a, r_a, r_f, h, dx, u, work, V):  # type: ignore[no-untyped-def]
-    """Rows a = g with R = r_a² ‖a − g‖² + r_f², then g to unit length with its covariance (eq 13 to 20)."""
+    """Rows a = g with R = r_a² ‖a − g‖² + r_f², then normalisation of g and its covariance (eq 13 to 20)."""
     square = (a[0] - x[0]) ** 2 + (a[1] - x[1]) ** 2 + (a[2] - x[2]) ** 2
     variance = r_a * r_a * square + r_f * r_f
     dx[:] = 0.0

@@ -1,4 +1,4 @@
-"""From an algorithm's gains to the compiled loop of its engine and the state it runs on."""
+"""From an algorithm's gains to the compiled loop of its engine and its state."""
 
 from __future__ import annotations
 
@@ -29,6 +29,7 @@ from sagittal.core.fusion.algorithms.gains import (
     InnovationRules,
 )
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
+from sagittal.core.message import Message
 from sagittal.core.rotation import conjugate, rotate
 
 GAINS_RATE_HZ: Final = 100.0
@@ -40,7 +41,7 @@ Run = Callable[[Floats, Floats, Floats, Floats, Floats], None]
 
 @dataclass(frozen=True)
 class Setting:
-    """What a filter starts from.
+    """Initial conditions of a filter.
 
     Parameters
     ----------
@@ -54,7 +55,7 @@ class Setting:
     has_mag: bool
 
     def rows(self, names: Sequence[str], convert: Callable[[str, Floats], Floats]) -> Floats:
-        """Gains (g, 42) in the order of names; one that the algorithm does not have is zero."""
+        """Gains (g, 42) in the order of names; zero for those the algorithm does not have."""
         found = []
         for name in names:
             gain: Gain = getattr(self.params, name, FixedGain(0.0))
@@ -65,19 +66,19 @@ class Setting:
         return np.array(found).reshape(-1, WIDTH)
 
     def constants(self, names: Sequence[str]) -> dict[str, float]:
-        """Numbers by name; one that the algorithm does not have is zero."""
+        """Numbers by name; zero for those the algorithm does not have."""
         return {name: float(getattr(self.params, name, 0.0)) for name in names}
 
     def noise_rows(self, names: Sequence[str]) -> Floats:
-        """Gains that are noises of samples: a white noise of the same density at every rate."""
+        """Gains that are sample noises: white noise of the same density at every rate."""
         return self.rows(names, lambda _, values: values * sqrt(self.rate_hz / GAINS_RATE_HZ))
 
     def decay(self, share: float) -> float:
-        """Share left after a sample of this rate, of one at 100 Hz."""
+        """Fraction left after a sample at this rate, for one given at 100 Hz."""
         return float(share ** (GAINS_RATE_HZ / self.rate_hz))
 
     def drive(self, variance: float, share: float) -> float:
-        """Variance gained in a sample of this rate, so that the spread in the long run stays."""
+        """Variance added per sample at this rate that preserves the stationary spread."""
         if share >= 1.0:
             return variance * GAINS_RATE_HZ / self.rate_hz
         return variance * (1.0 - self.decay(share) ** 2) / (1.0 - share**2)
@@ -85,7 +86,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Prepared:
-    """A filter ready to run: state (S, size), loop, and where the gyroscope bias stands in the state."""
+    """A filter ready to run: state (S, size), loop, and position of the gyroscope bias in the state."""
 
     state: Floats
     run: Run
@@ -101,7 +102,9 @@ def prepare_complementary(kind: str, given: Setting) -> Prepared:
         if name not in shares:
             return values
         if (values > 1.0).any():
-            raise ParameterError("gain_out_of_range", f"Gain {name} is a share of an error: 0 to 1.")
+            raise ParameterError(
+                "gain_out_of_range", Message("Gain {name} is a share of an error: 0 to 1.", name=name)
+            )
         return np.asarray(1.0 - (1.0 - values) ** ratio)
 
     rows = given.rows(complementary.GAINS[kind], convert)

@@ -1,7 +1,7 @@
 """Engine E5: Kalman filters of the error of an orientation, in sensor axes, and of biases and disturbances.
 
-Three of the five split the heading: the magnetometer turns about the vertical only, by a scalar innovation.
-Equations: docs/science/filters.md, "E5 Error-state filters".
+Three of the five separate the heading: the magnetometer rotates about the vertical only, by a scalar
+innovation. Equations: docs/science/filters.md, "E5 Error-state filters".
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def run_error_state(kind, n, decay_a, gyr, acc, mag, dt, m_ref, rows, constants,
 
     Parameters
     ----------
-    n : states of the kind. decay_a : share of the acceleration of `disturbed` left after a sample.
+    n : number of states. decay_a : fraction of the acceleration of `disturbed` left after a sample.
     """
     w, a, m, up = np.empty(3), np.empty(3), np.empty(3), np.zeros(3)
     up[2] = 1.0
@@ -175,7 +175,7 @@ def _predict(kind, q, b, own, d, P, w, dt, sigma_g, decay_a, c, E, V):  # type: 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _point_row(h, v, i):  # type: ignore[no-untyped-def]
-    """Write row i of [v]× into the first three of h (n,), the others zero."""
+    """Write row i of [v]× to the first three of h (n,), zeros to the others."""
     h[:] = 0.0
     if i == 0:
         h[1], h[2] = -v[2], v[1]
@@ -187,7 +187,7 @@ def _point_row(h, v, i):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _inject(kind, q, b, own, d, dx):  # type: ignore[no-untyped-def]
-    """Put the estimated errors into the states, and set them to zero."""
+    """Transfer the estimated errors to the states, and reset them to zero."""
     turn_by(q, dx[0], dx[1], dx[2])
     n = dx.shape[0]
     for i in range(3):
@@ -210,7 +210,9 @@ def _widen(x, square, c):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _take_external(x, P, y, v, sigma_a, c, dx, U, R, H, S, L, W):  # type: ignore[no-untyped-def]
-    """Suh 2010, eq 22 to 33: what the residuals spread beyond their model is external acceleration."""
+    """Suh 2010, eq 22 to 33: residual spread in excess of the model is attributed to external
+    acceleration.
+    """
     count = int(c[M1])
     at = int(x[HEAD - 2])
     for i in range(3):
@@ -251,7 +253,7 @@ def _take_external(x, P, y, v, sigma_a, c, dx, U, R, H, S, L, W):  # type: ignor
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def principal_axes(A, axes):  # type: ignore[no-untyped-def]
-    """Turn a symmetric A (3, 3) into its diagonal in place and write its eigenvectors as columns (Jacobi)."""
+    """Diagonalise a symmetric A (3, 3) in place and write its eigenvectors as columns (Jacobi)."""
     for i in range(3):
         for j in range(3):
             axes[i, j] = 1.0 if i == j else 0.0

@@ -1,8 +1,8 @@
 """Engine E3: extended Kalman filters of the quaternion and any of five blocks of three states.
 
 Blocks: non-gravitational acceleration a, gyroscope bias b, magnetic disturbance d, accelerometer bias b_A,
-magnetometer bias b_M. A finite γ makes the filter H∞. The covariance is advanced block by block and corrected
-row by row: about a microsecond a sample. Equations: docs/science/filters.md, "E3 Extended Kalman filters".
+magnetometer bias b_M. A finite γ makes the filter H∞. The covariance is propagated block by block and updated
+row by row: about a microsecond per sample. Equations: docs/science/filters.md, "E3 Extended Kalman filters".
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ RING: Final = 2 * WINDOW + 1
 
 
 def find_blocks(kind: str, learns_bias: bool) -> str:
-    """Blocks of states of a filter; without a magnetometer neither b nor what belongs to one."""
+    """Blocks of states of a filter; without a magnetometer neither b nor the magnetic ones."""
     blocks = BLOCKS[kind]
     return blocks if learns_bias else "".join(x for x in blocks if x not in "bdM")
 
@@ -58,7 +58,7 @@ def start_state(blocks: str, q: Floats, p0: float) -> Floats:
 
 
 def place_blocks(blocks: str) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """First state of a, b, d, b_A, b_M (5,); −1 where a filter does not have them."""
+    """First state of a, b, d, b_A, b_M (5,); −1 for those a filter does not have."""
     return np.array([4 + 3 * blocks.index(x) if x in blocks else -1 for x in "abdAM"], np.int64)
 
 
@@ -70,7 +70,7 @@ def run_extended_kalman(quasi_static, places, gyr, acc, mag, dt, m_ref, rows, co
 
     Parameters
     ----------
-    quasi_static : levels by the spread of norms over a window instead of the deviation. places : (5,).
+    quasi_static : levels chosen by the spread of norms over a window instead of the deviation. places : (5,).
     """
     n = 4
     for i in range(5):
@@ -115,7 +115,7 @@ def run_extended_kalman(quasi_static, places, gyr, acc, mag, dt, m_ref, rows, co
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _list_blocks(places, n, dt, constants):  # type: ignore[no-untyped-def]
-    """Decay a sample (n,) and added variance a sample (n,) of every state but q."""
+    """Decay per sample (n,) and added variance per sample (n,) of every state except q."""
     decay, noise = np.ones(n), np.zeros(n)
     for i in range(3):
         if places[0] >= 0:
@@ -135,12 +135,12 @@ def _list_blocks(places, n, dt, constants):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def predict_state(x, P, w, dt, sigma_g, b, decay, noise, turn, B, xi, V):  # type: ignore[no-untyped-def]
-    """Advance x (n,) and P (n, n) by one sample of rate w (3,); Nazarahari 2021, eq 26, 28, 39 and 40.
+    """Propagate x (n,) and P (n, n) by one sample of rate w (3,); Nazarahari 2021, eq 26, 28, 39 and 40.
 
     Parameters
     ----------
-    b : first state of the gyroscope bias, −1 without. turn (4, 4), B, xi (4, 3), V (4, n) : work; turn =
-    ∂q⁺/∂q and B = ∂q⁺/∂b are what it used.
+    b : first state of the gyroscope bias, −1 without. turn (4, 4), B, xi (4, 3), V (4, n) : work; afterwards
+        turn = ∂q⁺/∂q and B = ∂q⁺/∂b.
     """
     n = x.shape[0]
     if b >= 0:
@@ -188,7 +188,7 @@ def predict_state(x, P, w, dt, sigma_g, b, decay, noise, turn, B, xi, V):  # typ
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _take_vector(x, P, v, r, sigma, one, other, f, J, h, dx, u):  # type: ignore[no-untyped-def]
-    """Rows v = R(q)ᵀ r + x[one:] + x[other:] (eq 42 to 45), blocks that are −1 left out."""
+    """Rows v = R(q)ᵀ r + x[one:] + x[other:] (eq 42 to 45), omitting blocks that are −1."""
     to_sensor(x, r, f)
     direction_jacobian(x, r, J)
     for i in range(3):

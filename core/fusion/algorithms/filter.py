@@ -13,6 +13,7 @@ from sagittal.core.fusion.algorithms.engines import PREPARE, Prepared, Setting
 from sagittal.core.fusion.algorithms.listed import BY_NAME, Algorithm
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.algorithms.vectors import level
+from sagittal.core.message import Message
 from sagittal.core.rotation import from_matrix, normalise, rotate
 
 UPRIGHT: Final = 0.9
@@ -21,7 +22,7 @@ UPRIGHT: Final = 0.9
 
 @dataclass(frozen=True, eq=False)
 class RestMeans:
-    """Means over a rest, from which a filter starts: tilt and heading by TRIAD, norms, gyroscope bias.
+    """Means over a rest to initialise a filter: tilt and heading by TRIAD, norms, gyroscope bias.
 
     Parameters
     ----------
@@ -34,11 +35,11 @@ class RestMeans:
 
     @classmethod
     def over(cls, acc: Floats, gyr: Floats, mag: Floats | None = None) -> RestMeans:
-        """Means of the samples (n, S, 3) of a rest; samples that are not numbers are left out.
+        """Means of the samples (n, S, 3) of a rest; non-finite samples are ignored.
 
         Raises
         ------
-        SignalError `bad_signal` where a sensor has none.
+        SignalError `bad_signal` if a sensor has none.
         """
         means = [None if x is None else _mean(x) for x in (acc, gyr, mag)]
         return cls(*means)  # type: ignore[arg-type]
@@ -50,7 +51,7 @@ class RestMeans:
 
         Raises
         ------
-        SignalError `bad_signal` where there is no gravity, or the field is vertical.
+        SignalError `bad_signal` without gravity, or if the field is vertical.
         """
         q, field = np.empty((len(self.acc), 4)), np.tile([0.0, 1.0, 0.0], (len(self.acc), 1))
         R = np.empty((3, 3))
@@ -59,7 +60,10 @@ class RestMeans:
             north = np.array(seed) if self.mag is None else np.ascontiguousarray(self.mag[s], np.float64)
             vertical = np.ascontiguousarray(up, np.float64)
             if not (np.linalg.norm(vertical) > 0.0 and level(vertical, north, R)):
-                raise SignalError("bad_signal", f"Sensor {s} shows no direction at rest; use another rest.")
+                raise SignalError(
+                    "bad_signal",
+                    Message("Sensor {value} shows no direction at rest; use another rest.", value=s),
+                )
             q[s] = from_matrix(R)
             if self.mag is not None:
                 v = rotate(q[s], north)
@@ -81,14 +85,14 @@ class FusionFilter:
 
     Parameters
     ----------
-    name : of `ALGORITHMS`. rate_hz : of the samples. rest : what it starts from. params : gains, of the
-    algorithm's own class; None = its defaults. magnetometer : whether to use one; None = where `rest` has it
-    and the algorithm can.
+    name : of `ALGORITHMS`. rate_hz : of the samples. rest : initial conditions. params : gains, of the
+        algorithm's class; None = its defaults. magnetometer : whether to use one; None = if `rest` has it and
+        the algorithm supports it.
 
     Raises
     ------
-    ParameterError `no_such_algorithm`, `gain_out_of_range`.
-    EstimationError `no_magnetometer` where the algorithm needs one.
+    ParameterError `no_such_algorithm`, `gain_out_of_range`. EstimationError `no_magnetometer` if the
+    algorithm needs one.
     """
 
     def __init__(
@@ -105,15 +109,25 @@ class FusionFilter:
         if type(params) is not self.algorithm.gains:
             raise ParameterError(
                 "gain_out_of_range",
-                f"{self.algorithm.label} takes {self.algorithm.gains.__name__}, not {type(params).__name__}.",
+                Message(
+                    "{label} takes {name__}, not {type}.",
+                    label=self.algorithm.label,
+                    name__=self.algorithm.gains.__name__,
+                    type=type(params).__name__,
+                ),
             )
         if not rate_hz > 0.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be above 0, not {rate_hz:g} Hz.")
+            raise ParameterError(
+                "rate_out_of_range", Message("The rate must be above 0, not {rate_hz:g} Hz.", rate_hz=rate_hz)
+            )
         used = rest.mag is not None if magnetometer is None else magnetometer
         if self.algorithm.magnetometer == "needed" and not (used and rest.mag is not None):
             raise EstimationError(
                 "no_magnetometer",
-                f"{self.algorithm.label} needs a magnetometer, and none is given. Choose one that does not.",
+                Message(
+                    "{label} needs a magnetometer, and none is given. Choose one that does not.",
+                    label=self.algorithm.label,
+                ),
             )
         self._uses_mag = used and rest.mag is not None and self.algorithm.magnetometer != "unused"
         self._params, self._rate_hz = params, rate_hz
@@ -138,15 +152,17 @@ class FusionFilter:
 
     @property
     def bias(self) -> Floats | None:
-        """Gyroscope bias (S, 3) in rad/s on top of that of the rest; None where a filter has none."""
+        """Gyroscope bias (S, 3) in rad/s relative to that of the rest; None if the filter has none."""
         at = self._prepared.bias
         return None if at is None else self._prepared.state[:, at : at + 3].copy()
 
     def reset(self, q: Floats) -> None:
-        """Start again at orientations q (S, 4) sensor to world, in the frame of the rest's field."""
+        """Restart at orientations q (S, 4) sensor to world, in the frame of the rest's field."""
         q = np.ascontiguousarray(q, np.float64)
         if q.shape != (len(self._rest.acc), 4) or not (np.linalg.norm(q, axis=1) > 0.0).all():
-            raise ParameterError("shape_mismatch", f"Expected orientations ({len(self._rest.acc)}, 4).")
+            raise ParameterError(
+                "shape_mismatch", Message("Expected orientations ({acc}, 4).", acc=len(self._rest.acc))
+            )
         self._prepared = self._prepare(normalise(q))
 
     def step(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
@@ -157,17 +173,17 @@ class FusionFilter:
     def advance(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
         """Orientations (n, S, 4) sensor to world after each sample of a block.
 
-        One run over n samples equals any split of it into blocks, bit for bit. A sample that is not a number,
-        or shorter than a tenth of the norm at rest, corrects nothing.
+        Results are bit-identical for any division into blocks. Samples that are non-finite, or shorter than a
+        tenth of the norm at rest, give no correction.
 
         Parameters
         ----------
-        gyr, acc, mag : (n, S, 3) in the units of the rest; gyr in rad/s with its bias still in.
+        gyr, acc, mag : (n, S, 3) in the units of the rest; gyr in rad/s including its bias.
 
         Raises
         ------
-        ParameterError `shape_mismatch`.
-        EstimationError `no_magnetometer` where mag is used and not given; `filter_diverged`.
+        ParameterError `shape_mismatch`. EstimationError `no_magnetometer` if mag is used but not given;
+        `filter_diverged`.
         """
         shape = (len(gyr), len(self._rest.acc), 3)
         if not self._uses_mag:
@@ -177,7 +193,7 @@ class FusionFilter:
                 "no_magnetometer", "This filter was started with a magnetometer; give its samples."
             )
         if any(x is not None and np.shape(x) != shape for x in (gyr, acc, mag)):
-            raise ParameterError("shape_mismatch", f"Expected samples of shape {shape}.")
+            raise ParameterError("shape_mismatch", Message("Expected samples of shape {shape}.", shape=shape))
         rate = np.ascontiguousarray(gyr - self._rest.gyr, np.float64)
         force = np.ascontiguousarray(acc / self._acc_norm, np.float64)
         field = np.full(shape, np.nan) if mag is None else mag / self._mag_norm
@@ -188,14 +204,17 @@ class FusionFilter:
         if not np.isfinite(prepared.state[:, :4]).all():
             raise EstimationError(
                 "filter_diverged",
-                f"{self.algorithm.label} has diverged: its covariance is no longer positive definite. "
-                "Raise γ, or reset the filter.",
+                Message(
+                    "{label} has diverged: its covariance is no longer positive definite. Raise γ, or "
+                    "reset the filter.",
+                    label=self.algorithm.label,
+                ),
             )
         return out
 
 
 def find_algorithm(name: str) -> Algorithm:
-    """The algorithm of a name.
+    """The algorithm with this name.
 
     Raises
     ------
@@ -203,6 +222,7 @@ def find_algorithm(name: str) -> Algorithm:
     """
     if name not in BY_NAME:
         raise ParameterError(
-            "no_such_algorithm", f"No algorithm '{name}'; `sagittal bench fusion --list` lists them."
+            "no_such_algorithm",
+            Message("No algorithm '{name}'; `sagittal bench fusion --list` lists them.", name=name),
         )
     return BY_NAME[name]

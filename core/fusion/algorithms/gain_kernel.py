@@ -1,4 +1,4 @@
-"""A gain at the motion of a sample, compiled; what a gain is says gains.py, which needs no numba."""
+"""A gain at the motion of a sample, compiled; defined in gains.py, which does not need numba."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ POINTS: Final = 201
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def is_moving(row):  # type: ignore[no-untyped-def]
-    """Whether the gain of a `row` (42,) can be another than its first value."""
+    """Whether the gain of a `row` (42,) can differ from its first value."""
     return row[9] != 0.0 or min(row[3], row[4], row[5]) < np.inf
 
 
@@ -44,7 +44,7 @@ def _rise(x, a, b):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _memberships(x, row, at):  # type: ignore[no-untyped-def]
-    """Low, middle and high of x by the corners at row[at : at + 8]."""
+    """Low, middle and high memberships of x with the corners at row[at : at + 8]."""
     low = 1.0 - _rise(x, row[at], row[at + 1])
     middle = min(_rise(x, row[at + 2], row[at + 3]), 1.0 - _rise(x, row[at + 4], row[at + 5]))
     return low, middle, _rise(x, row[at + 6], row[at + 7])

@@ -1,7 +1,6 @@
-"""Gains of an algorithm as a point in a unit box, over the logarithm of each number that may be tuned.
+"""Gains of an algorithm as a point in a unit box, on a logarithmic scale of each tunable number.
 
-Which numbers those are, and where they may lie, stands in the types of
-`sagittal.core.fusion.algorithms.parameters`.
+Tunable numbers and their ranges are given by the types of `sagittal.core.fusion.algorithms.parameters`.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from sagittal.core.fusion.algorithms.gains import FixedGain, FuzzyGain, Gain, Th
 from sagittal.core.fusion.algorithms.parameters import MAGNETIC, AlgorithmGains
 from sagittal.core.fusion.algorithms.schemes import Scheme
 from sagittal.core.fusion.algorithms.tuning_ranges import DEVIATION, TURNING, TuningRange
+from sagittal.core.message import Message
 
 DIGITS: Final = 4
 """Significant digits of a tuned gain: more would be noise of the data."""
@@ -28,7 +28,7 @@ THRESHOLDS: Final = {"acc": DEVIATION, "mag": DEVIATION, "gyr": TURNING}
 
 @dataclass(frozen=True)
 class _Variable:
-    """One number: a field of the gains, where in a gain (None = the field itself), place in a tuple."""
+    """One number: a field of the gains, location in a gain (None = the field itself), index in a tuple."""
 
     field: str
     part: str | None
@@ -37,12 +37,12 @@ class _Variable:
 
 
 class GainSpace:
-    """The numbers of some gains that may be tuned; all others stay.
+    """The tunable numbers of some gains; all others are constant.
 
     Parameters
     ----------
-    params : gains to start from; their levels are kept. magnetometer : whether one is used; without one the
-    gains that only it needs stay, and thresholds on it are dropped.
+    params : initial gains; their levels are kept. magnetometer : whether one is used; without one its
+        specific gains are constant, and thresholds on it are dropped.
 
     Raises
     ------
@@ -61,13 +61,16 @@ class GainSpace:
             for variable in _list_variables(name, getattr(params, name), limits)
         )
         if not self._variables:
-            raise ParameterError("nothing_to_tune", f"{type(params).__name__} has no gain that can be tuned.")
+            raise ParameterError(
+                "nothing_to_tune",
+                Message("{type} has no gain that can be tuned.", type=type(params).__name__),
+            )
 
     def __len__(self) -> int:
         return len(self._variables)
 
     def encode(self, params: AlgorithmGains) -> Floats:
-        """The point (d,) of gains with the levels of this space; what is outside its range is at its end."""
+        """The point (d,) of gains with the levels of this space; values outside their range are clipped."""
         return np.array([_to_unit(_read(params, v), v.limits) for v in self._variables])
 
     def decode(self, point: Floats) -> AlgorithmGains:
@@ -99,7 +102,7 @@ class GainSpace:
 
 
 def choose_scheme(params: AlgorithmGains, scheme: Scheme, *, magnetometer: bool) -> AlgorithmGains:
-    """The gains with every gain that may follow the motion doing it by a scheme, its levels alike at first.
+    """The gains with a scheme for every adaptive gain, initially with equal levels.
 
     A gain of the gyroscope follows the rate, one of accelerometer or magnetometer its deviation, a gain of
     both follows both (Nazarahari 2021, Table 5).
@@ -113,12 +116,12 @@ def choose_scheme(params: AlgorithmGains, scheme: Scheme, *, magnetometer: bool)
 
 
 def gains_to_json(params: AlgorithmGains) -> dict[str, Any]:
-    """Gains by name: a number, or the levels and thresholds of a gain; what is infinite is left out."""
+    """Gains by name: a number, or the levels and thresholds of a gain; infinite values are omitted."""
     return {f.name: x for f in fields(params) if (x := _to_plain(getattr(params, f.name))) is not None}
 
 
 def _change(params: Any, values: Mapping[str, Any]) -> AlgorithmGains:
-    """The same class of gains with other values; mypy cannot see that the names are those of its fields."""
+    """The same class of gains with other values; mypy cannot verify that the names are fields."""
     changed: AlgorithmGains = replace(params, **values)
     return changed
 
@@ -137,7 +140,7 @@ def _to_plain(value: Any) -> Any:
 
 
 def _find_ranges(gains: type[AlgorithmGains], magnetometer: bool) -> dict[str, TuningRange]:
-    """Field → range, of those that are read with or without a magnetometer."""
+    """Field → range, for those used with or without a magnetometer."""
     hints = get_type_hints(gains, include_extras=True)
     found = {}
     for f in fields(gains):
@@ -205,7 +208,7 @@ def _make_gain(value: float, scheme: Scheme, follows: tuple[str, ...], magnetome
 
 
 def _without_field(gain: Gain) -> Gain:
-    """The same gain with no threshold on the magnetometer; fixed where it followed nothing else."""
+    """The same gain without a threshold on the magnetometer; fixed if it followed nothing else."""
     if isinstance(gain, TwoLevelGain):
         rest = replace(gain, mag=np.inf)
         return FixedGain(gain.quiet) if isinf(rest.acc) and isinf(rest.gyr) else rest

@@ -1,6 +1,6 @@
-"""Gains that follow the motion: fixed, switched between two or three levels, or by fuzzy rules.
+"""Adaptive gains: fixed, switched between two or three levels, or by fuzzy rules.
 
-Nazarahari 2021, eq 23, 48–50 and section 4.2.2. A deviation is |‖y‖ − ‖y at rest‖| in units of the norm at
+Nazarahari 2021, eq 23, 48–50 and section 4.2.2. A deviation is |‖y‖ − ‖y at rest‖| relative to the norm at
 rest for accelerometer and magnetometer, and ‖y‖ in rad/s for the gyroscope.
 """
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 
 LEVELS: Final = slice(0, 3)
 """Where a row has the values of its levels."""
@@ -38,7 +39,7 @@ class FixedGain:
         _require_not_negative(self.value)
 
     def row(self) -> Floats:
-        """What `choose_level` reads, (42,)."""
+        """Row (42,) for `choose_level`."""
         return _level_row((self.value, self.value, self.value), (inf, inf, inf), (0.0, 0.0, 0.0))
 
 
@@ -48,7 +49,7 @@ class TwoLevelGain:
 
     Parameters
     ----------
-    acc, mag : threshold in units of the norm at rest. gyr : rad/s. inf = not asked.
+    acc, mag : threshold in units of the norm at rest. gyr : rad/s. inf = not used.
     """
 
     quiet: float
@@ -61,7 +62,7 @@ class TwoLevelGain:
         _require_not_negative(self.quiet, self.moving, self.acc, self.mag, self.gyr)
 
     def row(self) -> Floats:
-        """What `choose_level` reads, (42,)."""
+        """Row (42,) for `choose_level`."""
         limits = self.acc, self.mag, self.gyr
         return _level_row((self.quiet, self.moving, self.moving), limits, (0.0, 0.0, 0.0))
 
@@ -72,7 +73,7 @@ class ThreeLevelGain:
 
     Parameters
     ----------
-    acc, mag : first and second threshold in units of the norm at rest. gyr : rad/s. inf = not asked.
+    acc, mag : first and second threshold in units of the norm at rest. gyr : rad/s. inf = not used.
     """
 
     quiet: float
@@ -89,7 +90,7 @@ class ThreeLevelGain:
             raise ParameterError("gain_out_of_range", "The first threshold of a gain is above its second.")
 
     def row(self) -> Floats:
-        """What `choose_level` reads, (42,)."""
+        """Row (42,) for `choose_level`."""
         low, high = zip(self.acc, self.mag, self.gyr, strict=True)
         return _level_row((self.quiet, self.middle, self.moving), low, high)
 
@@ -101,15 +102,15 @@ M₃ to M₄, high rises from H₁ to H₂."""
 
 @dataclass(frozen=True)
 class FuzzyGain:
-    """Mamdani's rules on low, middle and high deviations; the centroid of what they say is the gain.
+    """Mamdani's rules on low, middle and high deviations; the gain is the centroid of their output.
 
     Falling (a gain against the gyroscope): all low → high; any high → low; any middle and none high → middle.
-    The thesis asks for all middle, which leaves holes (docs/science/filters.md, "Corrections to the texts").
-    Rising (a noise): low → low, middle → middle, high → high.
+    The thesis requires all middle, which leaves undefined cases (docs/science/filters.md, "Corrections to the
+    texts"). Rising (a noise): low → low, middle → middle, high → high.
 
     Parameters
     ----------
-    output : of the gain. acc, mag, gyr : of a deviation; None = not asked. rising : which rules.
+    output : of the gain. acc, mag, gyr : of a deviation; None = not used. rising : which rules.
     """
 
     output: Corners
@@ -125,7 +126,7 @@ class FuzzyGain:
         _require_not_negative(*(x for corners in (self.output, *named) for x in corners))
 
     def row(self) -> Floats:
-        """What `choose_level` reads, (42,)."""
+        """Row (42,) for `choose_level`."""
         row = np.zeros(WIDTH)
         row[9] = FUZZY_RISES if self.rising else FUZZY_FALLS
         for i, corners in enumerate((self.acc, self.mag, self.gyr, self.output)):
@@ -138,15 +139,16 @@ Gain = FixedGain | TwoLevelGain | ThreeLevelGain | FuzzyGain
 
 @dataclass(frozen=True)
 class InnovationRules:
-    """How the process noise follows the innovations (section 4.2.2.3): no gain, but a change of one a sample.
+    """Adaptation of the process noise to the innovations (section 4.2.2.3): not a gain, but its change per
+    sample.
 
-    The discrepancy is what was expected of the squared innovation, diagonal of P + R, less its mean over the
-    window. Low (more than expected) → high, an increase; middle → middle; high → low, a decrease.
+    The discrepancy is the expected squared innovation, diagonal of P + R, minus its mean over the window. Low
+    (more than expected) → high, an increase; middle → middle; high → low, a decrease.
 
     Parameters
     ----------
-    discrepancy : corners, of the quaternion squared. change : corners, of σ_G² in (rad/s)² a sample at
-    100 Hz. window : samples at 100 Hz.
+    discrepancy : corners, of the quaternion squared. change : corners, of σ_G² in (rad/s)² per sample at 100
+        Hz. window : samples at 100 Hz.
     """
 
     discrepancy: Corners
@@ -155,10 +157,13 @@ class InnovationRules:
 
     def __post_init__(self) -> None:
         if not 1 <= self.window <= LONGEST_WINDOW:
-            raise ParameterError("gain_out_of_range", f"The window is 1 to {LONGEST_WINDOW} samples.")
+            raise ParameterError(
+                "gain_out_of_range",
+                Message("The window is 1 to {LONGEST_WINDOW} samples.", LONGEST_WINDOW=LONGEST_WINDOW),
+            )
 
     def row(self) -> Floats:
-        """What `infer_gain` reads, (42,)."""
+        """Row (42,) for `infer_gain`."""
         row = np.full(WIDTH, nan)
         row[9] = FUZZY_FALLS
         row[10:18] = order_corners(self.discrepancy)
@@ -167,7 +172,7 @@ class InnovationRules:
 
 
 def order_corners(corners: Corners) -> Corners:
-    """Corners moved so that neighbours meet: the seven constraints of section 4.2.3, in their order."""
+    """Corners shifted so that neighbours meet: the seven constraints of section 4.2.3, in order."""
     l1, l2, m1, m2, m3, m4, h1, h2 = corners
     l2 = max(l2, l1, m1)
     m2 = max(m2, m1)

@@ -1,4 +1,4 @@
-"""Steps of Kalman filters on dense covariances, inside compiled loops, in place and without allocation."""
+"""Steps of Kalman filters with dense covariances, inside compiled loops, in place and without allocation."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numba
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_scalar(P, h, variance, residual, dx, u):  # type: ignore[no-untyped-def]
-    """One row of a measurement: P (n, n) and the correction dx (n,) of one linearisation, in place.
+    """Scalar measurement update: P (n, n) and the correction dx (n,) of one linearisation, in place.
 
-    Rows taken one by one equal the update by all of them at once where their noises are independent. The
-    rank-one form keeps P symmetric to the bit.
+    Sequential rows equal the joint update if their noises are independent. The rank-one form keeps P exactly
+    symmetric.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def take_scalar(P, h, variance, residual, dx, u):  # type: ignore[no-untyped-def
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def factor(A, L):  # type: ignore[no-untyped-def]
-    """Write the lower triangular L with L Lᵀ = A (n, n); False where A is not positive definite."""
+    """Write the lower triangular L with L Lᵀ = A (n, n); False if A is not positive definite."""
     n = A.shape[0]
     for i in range(n):
         for j in range(i + 1):
@@ -61,7 +61,7 @@ def factor(A, L):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_block(P, H, R, y, dx, S, L, V):  # type: ignore[no-untyped-def]
-    """All rows of a measurement at once, with correlated noise R (m, m): P (n, n) and dx (n,) in place.
+    """Joint measurement update with correlated noise R (m, m): P (n, n) and dx (n,) in place.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def take_block(P, H, R, y, dx, S, L, V):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    False, with P and dx as they were, where H P Hᵀ + R is not positive definite.
+    False, with P and dx unchanged, if H P Hᵀ + R is not positive definite.
     """
     m, n = H.shape
     for i in range(m):
@@ -115,7 +115,7 @@ def bound_worst_case(P, square, A, L, V):  # type: ignore[no-untyped-def]
 
     Returns
     -------
-    False, with P as it was, where no such filter exists: γ² is not above the largest eigenvalue of P.
+    False, with P unchanged, if no such filter exists: γ² does not exceed the largest eigenvalue of P.
     """
     n = P.shape[0]
     for i in range(n):
@@ -142,7 +142,7 @@ def bound_worst_case(P, square, A, L, V):  # type: ignore[no-untyped-def]
 def triangularise(A, L):  # type: ignore[no-untyped-def]
     """Write the lower triangular L (n, n), diagonal ≥ 0, L Lᵀ = A Aᵀ, of A (n, m), m ≥ n; A is overwritten.
 
-    By Householder reflections of the rows, so no product A Aᵀ is ever formed.
+    By Householder reflections of the rows, without forming the product A Aᵀ.
     """
     n, m = A.shape
     for i in range(n):
@@ -179,11 +179,11 @@ def triangularise(A, L):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_away(L, v):  # type: ignore[no-untyped-def]
-    """Downdate L (n, n), lower triangular, so that L Lᵀ loses v vᵀ; v (n,) is overwritten.
+    """Downdate the lower triangular L (n, n) by v vᵀ: L Lᵀ − v vᵀ; v (n,) is overwritten.
 
     Returns
     -------
-    False where the rest is not positive definite; L is then unusable.
+    False if the result is not positive definite; L is then unusable.
     """
     n = L.shape[0]
     for k in range(n):

@@ -36,8 +36,8 @@ class Algorithm:
 
     Parameters
     ----------
-    name : as it is asked for. label : as the thesis names it. kind : of its engine. gains : their class.
-    grade : how sure the equations are (`GRADES`). magnetometer : needed, optional or unused.
+    name : identifier. label : name in the thesis. kind : variant of its engine. gains : their class. grade :
+        certainty of the equations (`GRADES`). magnetometer : needed, optional or unused.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Algorithm:
 
     @property
     def shown(self) -> str:
-        """Label as it is shown to people: what was reconstructed says so."""
+        """Display label, which marks reconstructions."""
         return f"{self.label} (reconstruction)" if self.grade == "C" else self.label
 
 

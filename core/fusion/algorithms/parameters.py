@@ -1,10 +1,9 @@
-"""The gains of every algorithm, one class each, as Table 10 of Nazarahari 2021 lists them.
+"""The gains of every algorithm, one class each, as listed in Table 10 of Nazarahari 2021.
 
-Units: accelerometer and magnetometer in shares of their norm at rest, rates in rad/s, noises σ and shares per
-sample as at 100 Hz; at other rates they are converted. A gain that may follow the motion takes a fixed
-value or two or three levels (`sagittal.core.fusion.algorithms.gains`). Values: docs/science/filters.md,
-"Gains".
-Each number that tuning may change has its range in its type; one without is left as it is.
+Units: accelerometer and magnetometer relative to their norm at rest, rates in rad/s, noises σ and fractions
+per sample at 100 Hz; they are converted to other rates. An adaptive gain takes a fixed value or two or three
+levels (`sagittal.core.fusion.algorithms.gains`). Values: docs/science/filters.md, "Gains". Each tunable
+number has its range in its type; numbers without a range are constant.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ MAGNETIC: Final = "magnetic"
 
 @dataclass(frozen=True)
 class MadgwickGains:
-    """beta : rad/s, step against the gradient. zeta : rad/s², of the gyroscope bias."""
+    """beta : rad/s, gradient step. zeta : rad/s², of the gyroscope bias."""
 
     beta: Annotated[Gain, RATE] = FixedGain(0.03)
     zeta: Annotated[float, DRIFT] = 0.0
@@ -58,7 +57,7 @@ class MahonyGains:
 
 @dataclass(frozen=True)
 class HuaGains:
-    """k1, k2 : 1/s, tilt and heading. k3, k4 : 1/s², bias by both. kb : 1/s, delta : rad/s, its bound."""
+    """k1, k2 : 1/s, tilt and heading. k3, k4 : 1/s², bias from both. kb : 1/s, delta : rad/s, its bound."""
 
     k1: Annotated[float, RATE] = 0.1
     k2: Annotated[float, RATE, MAGNETIC] = 0.05
@@ -91,7 +90,7 @@ class FouratiGains:
 
 @dataclass(frozen=True)
 class FouratiMartinGains(FouratiGains):
-    """The same, with a × m for m."""
+    """The same, with a × m instead of m."""
 
 
 @dataclass(frozen=True)
@@ -100,9 +99,10 @@ class AquaGains:
 
     Parameters
     ----------
-    sigma_m, alpha_a : share of the heading and of the tilt error. e1, e2 : deviations of the accelerometer up
-    to which the share is full, from which on it is none. sigma_b : share of the bias while steady. s_g, s_a,
-    s_b : steady below this rate, deviation of the accelerometer, change of the rate in a sample (rad/s).
+    sigma_m, alpha_a : fraction of the heading and of the tilt error. e1, e2 : deviations of the accelerometer
+        up to which the fraction is full, and above which it is zero. sigma_b : fraction of the bias while
+        steady. s_g, s_a, s_b : steady below this rate, deviation of the accelerometer, change of the rate in
+        a sample (rad/s).
     """
 
     sigma_m: Annotated[Gain, SHARE, MAGNETIC] = TwoLevelGain(0.001, 0.0, mag=0.1)
@@ -117,7 +117,9 @@ class AquaGains:
 
 @dataclass(frozen=True)
 class DelRosario2016Gains:
-    """mu_a, mu_m : share of the tilt and of the heading error; the table's ω_L is the threshold of mu_m."""
+    """mu_a, mu_m : fraction of the tilt and of the heading error; ω_L of the table is the threshold of
+    mu_m.
+    """
 
     mu_a: Annotated[Gain, SHARE] = FixedGain(0.0005)
     mu_m: Annotated[Gain, SHARE, MAGNETIC] = TwoLevelGain(0.001, 0.0003, gyr=3.0)
@@ -125,7 +127,7 @@ class DelRosario2016Gains:
 
 @dataclass(frozen=True)
 class Wu2016Gains:
-    """gamma_a, gamma_m : shares. thr_a, thr_m : residual of q from which on a sensor is left out."""
+    """gamma_a, gamma_m : fractions. thr_a, thr_m : residual of q above which a sensor is ignored."""
 
     gamma_a: Annotated[Gain, SHARE] = FixedGain(0.001)
     gamma_m: Annotated[Gain, SHARE, MAGNETIC] = TwoLevelGain(0.001, 0.0, acc=0.1, mag=0.1)
@@ -135,7 +137,7 @@ class Wu2016Gains:
 
 @dataclass(frozen=True)
 class Wu2019Gains:
-    """sigma_g : scale of the correction. w_a, w_m : weights. x : share."""
+    """sigma_g : scale of the correction. w_a, w_m : weights. x : fraction."""
 
     sigma_g: Annotated[Gain, WEIGHT] = FixedGain(1.0)
     w_a: Annotated[float, WEIGHT] = 0.75
@@ -154,7 +156,7 @@ class MarantosGains:
 
 @dataclass(frozen=True)
 class JustaGains:
-    """sigma_a, sigma_m : shares of tilt and field error."""
+    """sigma_a, sigma_m : fractions of tilt and field error."""
 
     sigma_a: Annotated[Gain, SHARE] = FixedGain(0.002)
     sigma_m: Annotated[Gain, SHARE, MAGNETIC] = TwoLevelGain(0.002, 0.0, mag=0.1)
@@ -162,11 +164,11 @@ class JustaGains:
 
 @dataclass(frozen=True)
 class KalmanGains:
-    """What every Kalman filter has.
+    """Common parameters of all Kalman filters.
 
     Parameters
     ----------
-    p0 : variance of every state at the start. sigma_g : rad/s. sigma_a, sigma_m : shares of the norm at rest.
+    p0 : initial variance of every state. sigma_g : rad/s. sigma_a, sigma_m : relative to the norm at rest.
     """
 
     p0: Annotated[float, VARIANCE] = 1e-3
@@ -177,21 +179,21 @@ class KalmanGains:
 
 @dataclass(frozen=True)
 class MarkleyGains(KalmanGains):
-    """s_b : rad/s/√s, walk of the gyroscope bias."""
+    """s_b : rad/s/√s, random walk of the gyroscope bias."""
 
     s_b: Annotated[float, WALK, MAGNETIC] = 1.4e-4
 
 
 @dataclass(frozen=True)
 class GuoGains(KalmanGains):
-    """adaptation : rules by which σ_G of each axis follows the innovations; sigma_g is where it starts."""
+    """adaptation : rules by which σ_G of each axis follows the innovations; sigma_g is its initial value."""
 
     adaptation: InnovationRules | None = None
 
 
 @dataclass(frozen=True)
 class GradientKalmanGains(KalmanGains):
-    """mu : step of the gradient descent that makes the measurement."""
+    """mu : step of the gradient descent that forms the measurement."""
 
     mu: Annotated[float, WEIGHT] = 0.25
 
@@ -208,7 +210,7 @@ class Wu2020RecursiveGains(GradientKalmanGains):
 
 @dataclass(frozen=True)
 class Wu2018Gains(KalmanGains):
-    """sigma_q : noise of the measured quaternion beside that of its sensors."""
+    """sigma_q : noise of the measured quaternion in addition to that of its sensors."""
 
     sigma_q: Annotated[float, NOISE] = 0.01
 
@@ -232,8 +234,9 @@ class Nazarahari2020Gains(KalmanGains):
 
     Parameters
     ----------
-    c_a, c_d : share of acceleration and magnetic disturbance left after a sample. s_a, s_d : drive a √s.
-    s_b : rad/s/√s, of a bias that nothing reaches (docs/science/filters.md, "Corrections to the texts").
+    c_a, c_d : fraction of acceleration and magnetic disturbance left after a sample. s_a, s_d : driving noise
+        per √s. s_b : rad/s/√s, of a bias that is not observable (docs/science/filters.md, "Corrections to the
+        texts").
     mu : step of the gradient descent.
     """
 
@@ -247,7 +250,7 @@ class Nazarahari2020Gains(KalmanGains):
 
 @dataclass(frozen=True)
 class GyroLibGains(KalmanGains):
-    """s_b : rad/s/√s, walk of the gyroscope bias."""
+    """s_b : rad/s/√s, random walk of the gyroscope bias."""
 
     s_b: Annotated[float, WALK, MAGNETIC] = 1.4e-4
 
@@ -268,7 +271,9 @@ class RenaudinGains(KalmanGains):
 
 @dataclass(frozen=True)
 class ChenGains(KalmanGains):
-    """c_a : share of the acceleration left after a sample. s_a : its drive a √s. s_b : walk of the bias."""
+    """c_a : fraction of the acceleration left after a sample. s_a : its driving noise per √s. s_b : random
+    walk of the bias.
+    """
 
     c_a: Annotated[float, LEFT] = 0.6
     s_a: Annotated[float, NOISE] = 0.064
@@ -277,7 +282,7 @@ class ChenGains(KalmanGains):
 
 @dataclass(frozen=True)
 class SabatiniGains(KalmanGains):
-    """s_b_a, s_b_m : walk of the biases of accelerometer and magnetometer a √s."""
+    """s_b_a, s_b_m : random walk of the biases of accelerometer and magnetometer per √s."""
 
     p0: Annotated[float, VARIANCE] = 1e-5
     s_b_a: Annotated[float, WALK] = 1e-6
@@ -338,9 +343,9 @@ class Suh2010Gains:
 
     Parameters
     ----------
-    p0, p_b, p_b_a : variances at the start: orientation, gyroscope and accelerometer bias. s_b, s_b_a : walks
-    of the biases a √s. m1 : samples of the mean of residuals, up to 16. gamma : spread beyond the model
-    from which on there is an acceleration. m2 : samples for which one is taken to go on.
+    p0, p_b, p_b_a : initial variances: orientation, gyroscope and accelerometer bias. s_b, s_b_a : random
+        walks of the biases per √s. m1 : number of averaged residuals, up to 16. gamma : excess spread that
+        indicates an external acceleration. m2 : number of samples for which it is assumed to last.
     """
 
     p0: Annotated[float, VARIANCE] = 0.01
@@ -358,7 +363,7 @@ class Suh2010Gains:
 
 @dataclass(frozen=True)
 class Suh2019Gains:
-    """sigma_g : rad/s. sigma_a, sigma_m : shares of the norm at rest."""
+    """sigma_g : rad/s. sigma_a, sigma_m : relative to the norm at rest."""
 
     p0: Annotated[float, VARIANCE] = 0.01
     sigma_g: Annotated[Gain, NOISE] = FixedGain(0.05)
@@ -372,9 +377,9 @@ class DelRosario2018Gains:
 
     Parameters
     ----------
-    c_a, c_m : share of the mean square residual that is added to the noise. n_s, n_l, n_m : samples of the
-    short and long running mean of the accelerometer, and of the heading. xi_a : least noise of the
-    accelerometer. xi_xy : of the heading, rad.
+    c_a, c_m : fraction of the mean square residual added to the noise. n_s, n_l, n_m : samples of the short
+        and long running mean of the accelerometer, and of the heading. xi_a : minimum noise of the
+        accelerometer. xi_xy : of the heading, rad.
     """
 
     p0: Annotated[float, VARIANCE] = 0.01
@@ -394,9 +399,9 @@ class RoetenbergGains(KalmanGains):
 
     Parameters
     ----------
-    zeta : rad/s/√s, walk of the gyroscope bias. xi : variance that the acceleration gains in a sample.
-    gamma : variance that the magnetic disturbance gains in a sample. sigma : share of it that is left after
-    one. m_exp : strength of the field; a disturbance beyond twice of it is jamming.
+    zeta : rad/s/√s, random walk of the gyroscope bias. xi : variance added to the acceleration per sample.
+        gamma : variance added to the magnetic disturbance per sample. sigma : fraction of it left after one.
+        m_exp : strength of the field; a disturbance of more than twice this value is treated as jamming.
     """
 
     zeta: Annotated[float, WALK, MAGNETIC] = 1.4e-4
@@ -412,8 +417,8 @@ class LigorioGains:
 
     Parameters
     ----------
-    p_a, p_m : variances at the start. c_a, c_m : share of acceleration and magnetic disturbance left after a
-    sample. s_a, s_m : what they gain in one.
+    p_a, p_m : initial variances. c_a, c_m : fraction of acceleration and magnetic disturbance left after a
+        sample. s_a, s_m : their driving noise per sample.
     """
 
     p_a: Annotated[float, VARIANCE] = 0.01
@@ -433,8 +438,8 @@ class HyytiGains:
 
     Parameters
     ----------
-    p_dcm, p_b : variances at the start. s_b : walk of the bias. sigma_a : weight of what the accelerometer is
-    off the vertical. sigma_f : least noise.
+    p_dcm, p_b : initial variances. s_b : random walk of the bias. sigma_a : weight of the deviation of the
+        accelerometer from the vertical. sigma_f : minimum noise.
     """
 
     p_dcm: Annotated[float, VARIANCE] = 0.01

@@ -1,6 +1,6 @@
 """Gains for sensors on a walking body, at 100 Hz: those of Nazarahari 2021, and those tuned here.
 
-Each segment for itself: the gains of one segment do badly on another.
+Separate for each segment: the gains of one segment perform poorly on another.
 """
 
 from __future__ import annotations

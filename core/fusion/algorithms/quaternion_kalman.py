@@ -1,6 +1,6 @@
-"""Engine E2: linear Kalman filters of the quaternion, with seven ways to make a measurement of it.
+"""Engine E2: linear Kalman filters of the quaternion, with seven ways of constructing its measurement.
 
-The measurement is made at the predicted quaternion; its noise is R = J Σ Jᵀ + ε 1 of the noise Σ of
+The measurement is computed at the predicted quaternion; its noise is R = J Σ Jᵀ + ε 1 with the noise Σ of
 accelerometer and magnetometer. Equations: docs/science/filters.md, "E2 Linear Kalman filters".
 """
 
@@ -46,7 +46,7 @@ EPS_PSEUDO: Final = 1e-6
 
 
 def count_states(kind: str) -> int:
-    """States with a covariance: q, and a and d where they are estimated."""
+    """Number of states with a covariance: q, and a and d if estimated."""
     return 10 if kind == "gd_disturbed" else 4
 
 
@@ -57,7 +57,7 @@ TAIL: Final = 3 + 4 * LONGEST_WINDOW + 2
 
 
 def start_state(kind: str, q: Floats, p0: float, variance: float) -> Floats:
-    """State (size,) at an orientation q (4,): states, covariance, what adapts."""
+    """State (size,) at an orientation q (4,): states, covariance, adaptation."""
     n = count_states(kind)
     tail = np.zeros(TAIL)
     tail[:3] = variance
@@ -70,7 +70,8 @@ def run_quaternion_kalman(kind, window, rules, gyr, acc, mag, dt, m_ref, rows, c
 
     Parameters
     ----------
-    window, rules : samples and row (42,) by which σ_G follows the innovations of `wahba`; window 0 = not.
+    window, rules : samples and row (42,) for the adaptation of σ_G to the innovations of `wahba`; window 0 =
+        none.
     """
     n = 10 if kind == GD_DISTURBED else 4
     w, a, m, work = np.empty(3), np.empty(3), np.empty(3), np.empty((4, 3))
@@ -148,9 +149,9 @@ def _predict(x, P, w, dt, variances, c, turn, xi, V):  # type: ignore[no-untyped
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _adapt(tail, y, P, R, window, rules):  # type: ignore[no-untyped-def]
-    """Change the variance of each axis by the innovation y (4,) and its window (Nazarahari 2021, 4.2.2.3).
+    """Adapt the variance of each axis to the innovation y (4,) and its window (Nazarahari 2021, 4.2.2.3).
 
-    Four innovations stand against three axes: the first three are taken, as the thesis does.
+    There are four innovations but three axes: the first three are used, as in the thesis.
     """
     ring, at, count = tail[3 : 3 + 4 * LONGEST_WINDOW], int(tail[-2]), min(tail[-1] + 1.0, window)
     for i in range(4):
@@ -172,7 +173,7 @@ def _make(kind, x, a, m, m_ref, mu, y, J, xi, work, four):  # type: ignore[no-un
 
     Returns
     -------
-    False where vertical and field are parallel.
+    False if vertical and field are parallel.
     """
     if kind == GD_DISTURBED:
         _make_disturbed(x, a, m, m_ref, mu, y, J, work, four)
@@ -233,8 +234,8 @@ def _make(kind, x, a, m, m_ref, mu, y, J, xi, work, four):  # type: ignore[no-un
 def _make_algebraic(q, v, f, y, J, xi, z):  # type: ignore[no-untyped-def]
     """Valenti 2016: the quaternion of vertical v and field f, unit (3,), with its derivative in closed form.
 
-    The turn θ of sensor axes by small δa and δm is −a × δa + up (east·δm − (m·up) east·δa)/h, h the length
-    of the field across the vertical; then δz = ½ Ξ(z) θ.
+    The rotation θ of sensor axes due to small δa and δm is −a × δa + up (east·δm − (m·up) east·δa)/h, h the
+    horizontal length of the field; then δz = ½ Ξ(z) θ.
     """
     R = np.empty((3, 3))
     if not level(v, f, R):
@@ -283,7 +284,7 @@ def _make_disturbed(x, a, m, m_ref, mu, y, J, work, four):  # type: ignore[no-un
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _weigh(kind, q, y, J, sigma_a, sigma_m, sigma_q, R):  # type: ignore[no-untyped-def]
-    """Write R = J Σ Jᵀ + ε 1 (n, n), and what a measurement needs beside."""
+    """Write R = J Σ Jᵀ + ε 1 (n, n), plus the additional terms of each kind of measurement."""
     n = R.shape[0]
     va, vm = sigma_a * sigma_a, sigma_m * sigma_m
     for i in range(n):

@@ -1,4 +1,4 @@
-"""How a gain follows the motion, by name; apart from the gains, which take long to import."""
+"""Names of the schemes of adaptive gains; separate from the gains, which take long to import."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Engine E4: square-root sigma-point filters of [q, b, a] with five sets of points.
 
-A set is a matrix of unit points and two rows of weights, so one loop runs all. State and measurement are
-factored together: one triangularisation gives the factor of the innovation, the gain and the factor of the
-corrected covariance. Equations: docs/science/filters.md, "E4 Sigma points".
+A set is a matrix of unit points and two rows of weights, so one loop serves all. State and measurement are
+factorised together: one triangularisation gives the factor of the innovation, the gain and the factor of the
+updated covariance. Equations: docs/science/filters.md, "E4 Sigma points".
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from sagittal.core.frames import Floats
 from sagittal.core.fusion.algorithms.gain_kernel import choose_level
 from sagittal.core.fusion.algorithms.kalman import take_away, triangularise
 from sagittal.core.fusion.algorithms.vectors import normalise, rate_jacobian, read_sample, to_sensor, turn_by
+from sagittal.core.message import Message
 
 Points = Literal["merwe", "julier95", "spherical_simplex", "menegaz", "cubature"]
 POINTS: Final[tuple[Points, ...]] = ("merwe", "julier95", "spherical_simplex", "menegaz", "cubature")
@@ -43,7 +44,7 @@ def make_points(
 
     Raises
     ------
-    ParameterError `gain_out_of_range` where a set has no such points.
+    ParameterError `gain_out_of_range` if a set has no such points.
     """
     star = np.concatenate((np.eye(n), -np.eye(n)))
     if kind == "cubature":
@@ -52,7 +53,10 @@ def make_points(
     if kind in ("merwe", "julier95"):
         scale = alpha**2 * (n + kappa) if kind == "merwe" else n + kappa
         if not scale > 0.0:
-            raise ParameterError("gain_out_of_range", f"κ = {kappa:g} must be above −{n}, α above 0.")
+            raise ParameterError(
+                "gain_out_of_range",
+                Message("κ = {kappa:g} must be above −{value}, α above 0.", kappa=kappa, value=n),
+            )
         mean = np.full(2 * n + 1, 0.5 / scale)
         mean[0] = 1.0 - n / scale
         spread = mean.copy()
@@ -60,7 +64,10 @@ def make_points(
             spread[0] += 1.0 - alpha**2 + beta
         return np.concatenate((np.zeros((1, n)), sqrt(scale) * star)), mean, spread
     if not 0.0 < weight < 1.0:
-        raise ParameterError("gain_out_of_range", f"Weight {weight:g} of the first point is not in 0 to 1.")
+        raise ParameterError(
+            "gain_out_of_range",
+            Message("Weight {weight:g} of the first point is not in 0 to 1.", weight=weight),
+        )
     if kind == "menegaz":
         share = sqrt((1.0 - weight) / n)
         C = np.linalg.cholesky(np.eye(n) - share**2)
@@ -71,7 +78,7 @@ def make_points(
         # in rows, as the other sets are: of columns the loop would be compiled once more
         return np.ascontiguousarray(np.concatenate((first, (C / np.sqrt(others)).T))), weights, weights
     if kind != "spherical_simplex":
-        raise ParameterError("gain_out_of_range", f"No set of sigma points '{kind}'.")
+        raise ParameterError("gain_out_of_range", Message("No set of sigma points '{kind}'.", kind=kind))
     w1 = (1.0 - weight) / (n + 1)
     X = np.zeros((n + 2, n))
     for j in range(1, n + 1):
@@ -82,7 +89,7 @@ def make_points(
 
 
 def count_states(learns_bias: bool) -> int:
-    """States [q, a] and, where it can be observed, b."""
+    """States [q, a] and, if observable, b."""
     return 10 if learns_bias else 7
 
 
@@ -203,7 +210,7 @@ def _place_points(x, L, points, X):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _measure(X, r, adds, Y, at):  # type: ignore[no-untyped-def]
-    """Write what every point predicts for the world's r, plus its acceleration, into Y[:, at : at + 3]."""
+    """Write the prediction of every point for the world's r, plus its acceleration, to Y[:, at : at + 3]."""
     for i in range(X.shape[0]):
         to_sensor(X[i], r, Y[i, at : at + 3])
         if adds:
@@ -213,7 +220,9 @@ def _measure(X, r, adds, Y, at):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _correct(x, L, D, Y, predicted, one, two, sigma_one, sigma_two, spread, B, joint, keep, v):  # type: ignore[no-untyped-def]
-    """Factor [measurement; state] together: its first columns hold the gain, its last block the new L."""
+    """Factorise [measurement; state] together: the first columns contain the gain, the last block the new
+    L.
+    """
     N, n = D.shape
     p = B.shape[0] - n
     B[:] = 0.0
@@ -252,7 +261,7 @@ def _correct(x, L, D, Y, predicted, one, two, sigma_one, sigma_two, spread, B, j
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _take_negative(spread, D, L, keep, v):  # type: ignore[no-untyped-def]
-    """Take points of negative weight out of L; a downdate that fails is left out."""
+    """Downdate L by points of negative weight; a downdate that fails is skipped."""
     for i in range(spread.shape[0]):
         if spread[i] < 0.0:
             keep[:] = L

@@ -1,7 +1,7 @@
-"""Particle swarm with the constants and the rounds of Nazarahari 2021, section 4.2.3.
+"""Particle swarm with the constants and rounds of Nazarahari 2021, section 4.2.3.
 
-Each iteration draws from a generator of its own (seed, round, iteration), so that a swarm that is read back
-from its file goes on exactly as if it had never stopped.
+Each iteration uses a separate random generator (seed, round, iteration), so that a swarm restored from its
+file continues exactly as if it had never been interrupted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 
 Cost = Callable[[Floats], Floats]
 """Points (p, d) in the unit box → what is to be small (p,); inf where there is no value."""
@@ -33,9 +34,10 @@ class SwarmRules:
 
     Parameters
     ----------
-    particles, iterations : of a round. rounds : in all. random_rounds : the first, which know no others.
-    inertia : of the velocity. damping : of the inertia, an iteration. personal, social : learning
-    coefficients. longest_step : of a coordinate in an iteration, share of its range (own choice).
+    particles, iterations : per round. rounds : total number. random_rounds : initial rounds, independent of
+        others. inertia : of the velocity. damping : of the inertia, per iteration. personal, social :
+        learning coefficients. longest_step : of a coordinate in an iteration, fraction of its range (own
+        choice).
     """
 
     particles: int = 50
@@ -54,24 +56,31 @@ class SwarmRules:
         for name, most in MOST_OF_SWARM.items():
             if getattr(self, name) > most:
                 raise ParameterError(
-                    "swarm_too_large", f"{name} is {getattr(self, name)}; expected at most {most}."
+                    "swarm_too_large",
+                    Message(
+                        "{name} is {self}; expected at most {most}.",
+                        name=name,
+                        self=getattr(self, name),
+                        most=most,
+                    ),
                 )
 
     @property
     def steps(self) -> int:
-        """Evaluations of the whole swarm."""
+        """Number of evaluations of the whole swarm."""
         return self.rounds * (self.iterations + 1)
 
 
 @dataclass(frozen=True, eq=False)
 class Swarm:
-    """A search as it stands after some iterations.
+    """State of a search after some iterations.
 
     Parameters
     ----------
-    step : iterations done, over all rounds. at, velocity, own : (p, d) places, velocities and best places of
-    the particles of this round. cost : (p,) at their best places. low, high : (d,) range of this round.
-    ended, ended_cost : (r, d), (r,) best place of each earlier round.
+    step : iterations done, over all rounds. at, velocity, own : (p, d) positions, velocities and best
+        positions of the particles of this round. cost : (p,) at their best positions. low, high : (d,) range
+        of this round.
+    ended, ended_cost : (r, d), (r,) best position of each earlier round.
     """
 
     step: int
@@ -86,20 +95,20 @@ class Swarm:
 
     @classmethod
     def start(cls, dimensions: int) -> Self:
-        """A swarm that has not moved yet."""
+        """A swarm before the first iteration."""
         none, line = np.empty((0, dimensions)), np.empty(0)
         return cls(0, none, none, none, line, np.zeros(dimensions), np.ones(dimensions), none, line)
 
     @property
     def best(self) -> tuple[Floats, float]:
-        """The best place (d,) of all rounds, and its cost."""
+        """The best position (d,) of all rounds, and its cost."""
         places = np.concatenate((self.ended, self.own))
         costs = np.concatenate((self.ended_cost, self.cost))
         first = int(np.argmin(costs))
         return places[first], float(costs[first])
 
     def to_json(self) -> dict[str, Any]:
-        """The swarm for `from_json`, bit for bit."""
+        """Serialise the swarm for `from_json`, bit for bit."""
         values = {f.name: np.asarray(getattr(self, f.name)).tolist() for f in fields(self)}
         # without a value a cost is infinite, which JSON does not know
         for name in ("cost", "ended_cost"):
@@ -108,7 +117,7 @@ class Swarm:
 
     @classmethod
     def from_json(cls, values: dict[str, Any]) -> Self:
-        """A swarm as `to_json` wrote it."""
+        """Parse a swarm written by `to_json`."""
         dimensions = len(values["low"])
         arrays = {f.name: np.array(values[f.name], np.float64) for f in fields(cls) if f.name != "step"}
         for name in ("cost", "ended_cost"):
@@ -119,10 +128,10 @@ class Swarm:
 
 
 def advance_swarm(swarm: Swarm, cost: Cost, start: Floats, rules: SwarmRules, seed: int) -> Swarm:
-    """One iteration: a new round where the last has ended, else one move of every particle.
+    """One iteration: a new round if the last has ended, else one step of every particle.
 
-    The first rounds search a random part of the box from random places; `start` (d,) is one of the first
-    round's. Later ones search around the best places of all earlier rounds, which they begin with.
+    The first rounds search a random part of the box from random positions; `start` (d,) is included in the
+    first round. Later ones search around the best positions of all earlier rounds, which they include.
     """
     number, iteration = divmod(swarm.step, rules.iterations + 1)
     rng = np.random.default_rng((seed, number, iteration))
@@ -185,7 +194,7 @@ def _begin_round(
 
 
 def write_swarm(swarm: Swarm, problem: str) -> bytes:
-    """A checkpoint: the swarm and the digest of what it searches."""
+    """A checkpoint: the swarm and the digest of its problem."""
     return json.dumps({"problem": problem, "swarm": swarm.to_json()}, allow_nan=False).encode()
 
 
@@ -194,7 +203,7 @@ def read_swarm(content: bytes, problem: str) -> Swarm:
 
     Raises
     ------
-    ParameterError `not_a_checkpoint`; `other_problem` where it searched something else.
+    ParameterError `not_a_checkpoint`; `other_problem` if it belongs to a different search.
     """
     try:
         found = json.loads(content)

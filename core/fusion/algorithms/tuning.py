@@ -1,8 +1,8 @@
-"""Gains of one algorithm fitted to recordings with a reference, and shown on others it was not fitted to.
+"""Gains of one algorithm fitted to recordings with a reference, and validated on others.
 
-Nazarahari 2021, section 4.2.3: a particle swarm makes the mean RMS error over the training trials small. The
+Nazarahari 2021, section 4.2.3: a particle swarm minimises the mean RMS error over the training trials. The
 error is the total one with a magnetometer and the inclination without, where the heading is arbitrary: both
-are free of the order of Euler angles, whose sum the thesis takes.
+are independent of the order of Euler angles, whose sum is used in the thesis.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from sagittal.core.fusion.algorithms.gain_space import GainSpace, choose_scheme,
 from sagittal.core.fusion.algorithms.parameters import AlgorithmGains
 from sagittal.core.fusion.algorithms.schemes import Scheme
 from sagittal.core.fusion.algorithms.swarm import Swarm, SwarmRules, advance_swarm, read_swarm, write_swarm
+from sagittal.core.message import Message
 
 Keep = Callable[[bytes, float, str], None]
 """(checkpoint, share done 0 to 1, sentence): told after every iteration."""
@@ -38,7 +39,7 @@ LEAST_GAIN: Final = 0.01
 
 @dataclass(frozen=True, eq=False)
 class TrialSplit:
-    """Trials to fit to, and others that only judge."""
+    """Training trials, and validation trials."""
 
     train: tuple[ReferenceTrial, ...]
     validate: tuple[ReferenceTrial, ...]
@@ -47,21 +48,30 @@ class TrialSplit:
         if not self.train or not self.validate:
             raise ParameterError(
                 "no_validation",
-                f"{len(self.train)} trials to fit to and {len(self.validate)} to judge by; at least one of "
-                "each is needed. Gains that are judged on what they were fitted to look too good.",
+                Message(
+                    "{train} trials to fit to and {validate} to judge by; at least one of each is "
+                    "needed. Gains that are judged on what they were fitted to look too good.",
+                    train=len(self.train),
+                    validate=len(self.validate),
+                ),
             )
         seen: dict[str, str] = {}
         for trial in (*self.train, *self.validate):
             for mark in (trial.name, trial.sha256):
                 if mark in seen:
                     raise ParameterError(
-                        "trial_twice", f"{seen[mark]} and {trial.name} are the same recording; leave one out."
+                        "trial_twice",
+                        Message(
+                            "{mark} and {name} are the same recording; leave one out.",
+                            mark=seen[mark],
+                            name=trial.name,
+                        ),
                     )
                 seen[mark] = trial.name
 
     @classmethod
     def by_name(cls, trials: Sequence[ReferenceTrial], validate: Collection[str]) -> TrialSplit:
-        """Split trials by the names of those that judge.
+        """Split trials by the names of the validation trials.
 
         Raises
         ------
@@ -70,7 +80,11 @@ class TrialSplit:
         if unknown := sorted(set(validate) - {t.name for t in trials}):
             raise ParameterError(
                 "no_such_trial",
-                f"No trial {', '.join(unknown)}; there are {', '.join(t.name for t in trials) or 'none'}.",
+                Message(
+                    "No trial {unknown}; there are {join}.",
+                    unknown=", ".join(unknown),
+                    join=", ".join(t.name for t in trials) or "none",
+                ),
             )
         return cls(
             tuple(t for t in trials if t.name not in validate), tuple(t for t in trials if t.name in validate)
@@ -79,14 +93,15 @@ class TrialSplit:
 
 @dataclass(frozen=True)
 class TuningResult:
-    """What a tuning found.
+    """Result of a tuning.
 
     Parameters
     ----------
     start, gains : by name, before and after. trained, validated : trial → RMS error in ° with the gains
-    before and after, None where the filter diverged. data : trial → sha256 of its samples. data_sha256 : of
-    all of them and which half each is in. rules : constants of the swarm.
-    improved : the mean over the validating trials fell by more than a hundredth. verdict : that in words.
+    before and after, None if the filter diverged. data : trial → sha256 of its samples. data_sha256 : of all
+        of them and of the split. rules : constants of the swarm.
+    improved : the mean over the validation trials decreased by more than one percent. verdict : that in
+        words.
     """
 
     algorithm: str
@@ -109,13 +124,13 @@ class TuningResult:
 
 
 class GainTuner:
-    """One search, ready to run; the same arguments give the same gains, bit for bit, on any number of cores.
+    """One search, ready to run; equal arguments give bit-identical gains on any number of cores.
 
     Parameters
     ----------
-    algorithm : of `ALGORITHMS`. split : see `TrialSplit`. start : gains to begin with, None = the defaults.
-    scheme : of the gains that may follow the motion, None = that of `start`. magnetometer : None = where the
-    algorithm can and every trial has one. code_version : goes into the result and the checkpoint.
+    algorithm : of `ALGORITHMS`. split : see `TrialSplit`. start : initial gains, None = the defaults.
+        scheme : of the adaptive gains, None = that of `start`. magnetometer : None = if the algorithm
+        supports it and every trial has one. code_version : recorded in the result and the checkpoint.
 
     Raises
     ------
@@ -139,9 +154,14 @@ class GainTuner:
         without = [t.name for t in (*split.train, *split.validate) if not t.has_magnetometer]
         uses_mag = found.magnetometer != "unused" and magnetometer is not False and not without
         if not uses_mag and (found.magnetometer == "needed" or (magnetometer and without)):
-            why = f"{', '.join(without)} have none" if without else "it is told to go without"
+            why = (
+                Message("{without} have none", without=", ".join(without))
+                if without
+                else "it is told to go without"
+            )
             raise EstimationError(
-                "no_magnetometer", f"{found.label} is to run with a magnetometer, but {why}."
+                "no_magnetometer",
+                Message("{label} is to run with a magnetometer, but {why}.", label=found.label, why=why),
             )
         params = found.gains() if start is None else start
         self._name, self._split, self._seed, self._version = algorithm, split, seed, code_version
@@ -152,7 +172,8 @@ class GainTuner:
             find_rest(trial)
             if not trial.scored.any():
                 raise SignalError(
-                    "no_reference", f"{trial.name} has no reference while it moves; leave it out."
+                    "no_reference",
+                    Message("{name} has no reference while it moves; leave it out.", name=trial.name),
                 )
         halves = [("train", t) for t in split.train] + [("validate", t) for t in split.validate]
         self._data = {t.name: t.sha256 for _, t in halves}
@@ -161,16 +182,16 @@ class GainTuner:
         self._problem = _digest((*searched, seed, astuple(self._rules), code_version))
 
     def read_checkpoint(self, content: bytes) -> Swarm:
-        """The swarm of a checkpoint of this very search; raises ParameterError, see `read_swarm`."""
+        """The swarm from a checkpoint of this same search; raises ParameterError, see `read_swarm`."""
         return read_swarm(content, self._problem)
 
     def run(self, keep: Keep, swarm: Swarm | None = None, each: ForEach = map) -> TuningResult:
-        """Search to the end.
+        """Run the search to its end.
 
         Parameters
         ----------
-        swarm : one that was kept, None = from the start. each : `map`, or that of a pool of threads: the
-        filters let go of the interpreter while they run.
+        swarm : a stored one to resume, None = from the start. each : `map`, or that of a thread pool: the
+            filters release the GIL while they run.
         """
 
         def score(gains: Sequence[AlgorithmGains], trials: Sequence[ReferenceTrial]) -> Floats:
@@ -192,7 +213,7 @@ class GainTuner:
         return self._report(after, score(both, self._split.train), score(both, self._split.validate))
 
     def _score(self, task: tuple[AlgorithmGains, ReferenceTrial]) -> float:
-        """RMS error in rad; inf where the filter diverges."""
+        """RMS error in rad; inf if the filter diverges."""
         gains, trial = task
         try:
             q = run_trial(self._name, trial, gains, magnetometer=self._uses_mag)
@@ -205,14 +226,23 @@ class GainTuner:
     def _say(self, swarm: Swarm) -> str:
         number = min((swarm.step - 1) // (self._rules.iterations + 1) + 1, self._rules.rounds)
         best = _say_error(swarm.best[1], 3)
-        return f"Round {number} of {self._rules.rounds}, {best} on the trials it is fitted to."
+        return Message(
+            "Round {number} of {rounds}, {best} on the trials it is fitted to.",
+            number=number,
+            rounds=self._rules.rounds,
+            best=best,
+        )
 
     def _report(self, after: AlgorithmGains, trained: Floats, validated: Floats) -> TuningResult:
         old, new = validated.mean(axis=1)
         improved = bool(new < (1.0 - LEAST_GAIN) * old)
         words = f"{_say_error(old, 2)} before, {_say_error(new, 2)} after, on trials not fitted to"
         worse = [t.name for t, a, b in zip(self._split.validate, *validated, strict=True) if b > a]
-        verdict = f"Better: {words}." if improved else f"Not better: {words}. Keep the gains it began with."
+        verdict = (
+            f"Better: {words}."
+            if improved
+            else Message("Not better: {words}. Keep the gains it began with.", words=words)
+        )
         if improved and worse:
             verdict += f" Worse on {', '.join(worse)}."
         return TuningResult(
@@ -233,7 +263,7 @@ class GainTuner:
 
 
 def _say_error(error: float, digits: int) -> str:
-    """An RMS error in rad in words; a filter that diverged has none."""
+    """An RMS error in rad as text; a filter that diverged has none."""
     return f"{math.degrees(error):.{digits}f}°" if math.isfinite(error) else "diverged"
 
 

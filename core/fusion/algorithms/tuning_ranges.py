@@ -1,4 +1,4 @@
-"""Where tuning looks for a gain, by the kind of number; an algorithm's gains name theirs in their types."""
+"""Search ranges of gains by kind of number; the types of an algorithm's gains refer to them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Final
 
 @dataclass(frozen=True)
 class TuningRange:
-    """Where tuning looks for a gain, evenly over its logarithm.
+    """Search range of a gain, uniform in its logarithm.
 
     Parameters
     ----------
-    low, high : above 0. left : what is looked for is 1 − the gain, which is a share that is left.
+    low, high : above 0. left : the search variable is 1 − the gain, which is a remaining fraction.
     """
 
     low: float

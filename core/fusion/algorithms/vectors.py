@@ -1,6 +1,6 @@
-"""Quaternion algebra of the filters, inside compiled loops; what a function gives goes into its last one.
+"""Quaternion algebra of the filters, inside compiled loops; array results are written to the last argument.
 
-Quaternions are scalar first and turn sensor to world. `sagittal.core.rotation.compiled` has what is not here.
+Quaternions are scalar first and map sensor to world. Other functions: `sagittal.core.rotation.compiled`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ LEAST_NORM = 0.1
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def read_sample(gyr, acc, mag, k, s, w, a, m):  # type: ignore[no-untyped-def]
-    """Copy sample k of sensor s of each (n, S, 3) to w, a, m (3,); a rate that is not a number becomes zero.
+    """Copy sample k of sensor s of each (n, S, 3) to w, a, m (3,); a non-finite rate becomes zero.
 
     Returns
     -------
-    Whether accelerometer and magnetometer can be used, their deviations from 1 (0 where they cannot), and the
-    norm of the rate.
+    Whether accelerometer and magnetometer can be used, their deviations from 1 (0 if not), and the norm of
+    the rate.
     """
     rate, acc2, mag2 = 0.0, 0.0, 0.0
     for i in range(3):
@@ -57,7 +57,7 @@ def half_turn(x, y, z):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def turn_by(q, x, y, z):  # type: ignore[no-untyped-def]
-    """Turn q (4,) in place by the rotation vector (x, y, z) of sensor axes, without normalising."""
+    """Rotate q (4,) in place by the rotation vector (x, y, z) of sensor axes, without normalising."""
     c, i, j, k = half_turn(x, y, z)
     q[0], q[1], q[2], q[3] = multiply(q[0], q[1], q[2], q[3], c, i, j, k)
 
@@ -71,7 +71,7 @@ def normalise(q):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def turn_to_sensor(q, x, y, z):  # type: ignore[no-untyped-def]
-    """R(q)ᵀ (x, y, z): a direction of the world as the sensor sees it (Nazarahari 2021, eq 31)."""
+    """R(q)ᵀ (x, y, z): a direction of the world in sensor axes (Nazarahari 2021, eq 31)."""
     w, a, b, c = q[0], q[1], q[2], q[3]
     i, j, k = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
     return x - w * i + b * k - c * j, y - w * j + c * i - a * k, z - w * k + a * j - b * i
@@ -99,7 +99,7 @@ def to_world(q, v, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def direction_jacobian(q, r, J):  # type: ignore[no-untyped-def]
-    """Write d(R(q)ᵀ r)/dq (3, 4) of the form of `to_sensor` (Nazarahari 2021, eq 34)."""
+    """Write d(R(q)ᵀ r)/dq (3, 4) in the form of `to_sensor` (Nazarahari 2021, eq 34)."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     u = (x, y, z)
     along = x * r[0] + y * r[1] + z * r[2]
@@ -180,16 +180,16 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def heading_error(q, m, work):  # type: ignore[no-untyped-def]
-    """Angle in rad by which the world must turn about the vertical so that m (3,) points north (+y)."""
+    """Angle in rad by which the world must be rotated about the vertical so that m (3,) points north (+y)."""
     to_world(q, m, work)
     return atan2(work[0], work[1])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def level(up, north, R):  # type: ignore[no-untyped-def]
-    """Write the rotation R (3, 3), sensor to world, of a vertical and the field, both (3,) in the sensor.
+    """Write the rotation R (3, 3), sensor to world, from vertical and field, both (3,) in sensor axes.
 
-    Rows east, north, up (Black 1964, TRIAD); False, and R as it was, where the two are parallel.
+    Rows east, north, up (Black 1964, TRIAD); False, with R unchanged, if the two are parallel.
     """
     x = north[1] * up[2] - north[2] * up[1]
     y = north[2] * up[0] - north[0] * up[2]

@@ -1,6 +1,6 @@
-"""Orientation of single sensors that find their own calibration while they move.
+"""Orientation of single sensors with self-calibration during movement.
 
-One error-state Kalman filter for any number of sensors, live in blocks or over a whole recording both ways:
+One error-state Kalman filter for any number of sensors, live in blocks or smoothed over a whole recording:
 docs/science/self-calibrating-filter.md.
 """
 

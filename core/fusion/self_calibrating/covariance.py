@@ -1,4 +1,4 @@
-"""How errors grow over an interval, and what a value says of them: compiled, one sensor.
+"""Error propagation over an interval, and scalar updates: compiled, one sensor.
 
 Equations: docs/science/self-calibrating-filter.md, "An interval".
 """
@@ -30,9 +30,9 @@ from sagittal.core.fusion.self_calibrating.layout import (
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def write_transition(sums, n, duration, F):  # type: ignore[no-untyped-def]
-    """Write F (6, m), how the errors of orientation (rows 0-2) and velocity (3-5) change over an interval.
+    """Write F (6, m), the change of the errors of orientation (rows 0-2) and velocity (3-5) over an interval.
 
-    The change alone, without the identity; errors of heading turn the velocity along and do not tilt it.
+    The change only, without the identity; heading errors rotate the velocity and do not tilt it.
     """
     F[:] = 0.0
     shaking = sums[S_SHAKING] / n
@@ -61,7 +61,7 @@ def write_transition(sums, n, duration, F):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def place_of(row):  # type: ignore[no-untyped-def]
-    """Error that a row of F belongs to."""
+    """Index of the error that a row of F belongs to."""
     return row if row < 3 else SPEED + row - 3
 
 
@@ -102,9 +102,9 @@ def predict_covariance(P, F, decay, work):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_scalar(P, d, K, at, h, m, residual, variance):  # type: ignore[no-untyped-def]
-    """Take residual = Σ h_j error[at_j] + noise, j < m, into P and the estimate d, both in place.
+    """Scalar update with residual = Σ h_j error[at_j] + noise, j < m, of P and the estimate d, both in place.
 
-    Only the lower triangle of P is read and written; K (n,) is room for the gain.
+    Only the lower triangle of P is used; K (n,) is scratch for the gain.
     """
     n = P.shape[0]
     s, e = variance, residual
@@ -129,7 +129,7 @@ def take_scalar(P, d, K, at, h, m, residual, variance):  # type: ignore[no-untyp
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def solve(A, b, L):  # type: ignore[no-untyped-def]
-    """b ← A⁻¹ b in place for a symmetric positive definite A (n, n); L is room for its factor."""
+    """b ← A⁻¹ b in place for a symmetric positive definite A (n, n); L is scratch for its factor."""
     n = len(b)
     for j in range(n):
         t = A[j, j]

@@ -1,4 +1,4 @@
-"""The filter for any number of sensors: live in blocks of any length, or a whole recording both ways."""
+"""The filter for any number of sensors: live in blocks of any length, or smoothed over a whole recording."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ from sagittal.core.fusion.self_calibrating.kernel import count_interval, run_for
 from sagittal.core.fusion.self_calibrating.motion import average_backwards, judge_motion
 from sagittal.core.fusion.self_calibrating.params import SelfCalibratingParams, make_weights
 from sagittal.core.fusion.self_calibrating.start import start_from_first
+from sagittal.core.message import Message
 
 NOTHING: Final = (np.empty((0, 4)), np.empty((0, 6, 0)), np.empty((0, 0)), np.empty((0, 1)))
 
 
 @dataclass(frozen=True, eq=False)
 class SensorEstimates:
-    """What the filter found of S sensors, at the last sample.
+    """Calibration estimates for S sensors, at the last sample.
 
     Parameters
     ----------
     gyro_bias : (S, 3) rad/s. gyro_matrix : (S, 3, 3), scale and misalignment: rate = (1 − matrix)(reading −
         bias). acc_bias : (S, 3) m/s². gravity : (S,) m/s². acc_delay_s : (S,). shaken_bias : (S, 3)
-        what the gyroscope's bias is more by while shaken, rad/s per g². hard_iron : (S, 3) in the
+        increase of the gyroscope bias under vibration, rad/s per g². hard_iron : (S, 3) in the
         magnetometer's unit, and mag_delay_s (S,); None without a magnetometer.
-    orientation_covariance : (S, 3, 3) rad² of the rotation vector, world axes, that turns the estimate to the
-        truth; the heading's is of a heading that begins at the start's field.
+    orientation_covariance : (S, 3, 3) rad² of the rotation vector, world axes, from the estimate to the
+        truth; heading is relative to the field at the start.
     """
 
     gyro_bias: Floats
@@ -45,24 +46,26 @@ class SensorEstimates:
 
 @dataclass(frozen=True, eq=False)
 class SmoothedOrientations:
-    """Orientations (n, S, 4) sensor to world by the whole recording, and the calibration at its end."""
+    """Orientations (n, S, 4) sensor to world smoothed over the whole recording, and the calibration at its
+    end.
+    """
 
     q: Floats
     estimates: SensorEstimates
 
 
 class SelfCalibratingFilter:
-    """Orientation of S sensors that learn biases, gyroscope matrix, delays and the place's magnetic field.
+    """Orientation of S sensors with estimated biases, gyroscope matrix, delays and local magnetic field.
 
-    World: z up; y the horizontal field at the start, without a magnetometer a free heading. A result belongs
-    to the end of its sample's interval. Samples that are not numbers are bridged: the orientation is held and
-    known less well; the magnetometer's are left out one by one.
+    World: z up; y the horizontal field at the start, without a magnetometer an arbitrary heading. A result
+    belongs to the end of its sample's interval. Non-finite samples are bridged: the orientation is held with
+    increasing uncertainty; those of the magnetometer are ignored individually.
 
     Parameters
     ----------
-    rate_hz : of the samples. sensors : S. magnetometer : whether blocks will have a field.
-    gyro_matrix : (S, 3, 3) what earlier recordings of the same sensors found (`SensorEstimates`), best their
-        median; it is where the filter begins, as surely as `gyro_matrix_sd` says.
+    rate_hz : of the samples. sensors : S. magnetometer : whether blocks will contain a field. gyro_matrix :
+        (S, 3, 3) estimate from earlier recordings of the same sensors (`SensorEstimates`), preferably their
+        median; initial value, with the uncertainty `gyro_matrix_sd`.
 
     Raises
     ------
@@ -79,9 +82,15 @@ class SelfCalibratingFilter:
         gyro_matrix: Floats | None = None,
     ) -> None:
         if not 10.0 <= rate_hz <= 5000.0:
-            raise ParameterError("rate_out_of_range", f"The rate must be 10 to 5000 Hz, not {rate_hz:g}.")
+            raise ParameterError(
+                "rate_out_of_range",
+                Message("The rate must be 10 to 5000 Hz, not {rate_hz:g}.", rate_hz=rate_hz),
+            )
         if sensors < 1:
-            raise ParameterError("sensors_out_of_range", f"At least one sensor is needed, not {sensors}.")
+            raise ParameterError(
+                "sensors_out_of_range",
+                Message("At least one sensor is needed, not {sensors}.", sensors=sensors),
+            )
         self.rate_hz, self.uses_magnetometer = rate_hz, magnetometer
         self._weights = make_weights(params or SelfCalibratingParams())
         size = at.WITH_MAG if magnetometer else at.WITHOUT_MAG
@@ -89,7 +98,10 @@ class SelfCalibratingFilter:
         self._x[:, 0] = 1.0
         if gyro_matrix is not None:
             if np.shape(gyro_matrix) != (sensors, 3, 3) or not np.isfinite(gyro_matrix).all():
-                raise ParameterError("shape_mismatch", f"Expected gyroscope matrices ({sensors}, 3, 3).")
+                raise ParameterError(
+                    "shape_mismatch",
+                    Message("Expected gyroscope matrices ({sensors}, 3, 3).", sensors=sensors),
+                )
             self._x[:, 14:23] = np.reshape(gyro_matrix, (sensors, 9))
         self._P = np.zeros((sensors, size, size))
         self._sums = np.zeros((sensors, at.SUMS))
@@ -98,7 +110,7 @@ class SelfCalibratingFilter:
         self._ring = np.zeros((sensors, at.RING, at.RING_WIDTH))
 
     def advance(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
-        """Run over the next samples; the result does not depend on how they are split into blocks.
+        """Process the next samples; the result is independent of the division into blocks.
 
         Parameters
         ----------
@@ -126,7 +138,7 @@ class SelfCalibratingFilter:
         return self._finish(q)
 
     def smooth(self, gyr: Floats, acc: Floats, mag: Floats | None = None) -> Floats:
-        """Run over a whole recording and back; as `advance`, on a filter that has seen no sample.
+        """Process a whole recording forward and backward; as `advance`, for a filter without samples so far.
 
         Raises
         ------
@@ -154,7 +166,7 @@ class SelfCalibratingFilter:
 
     @property
     def estimates(self) -> SensorEstimates:
-        """The calibration found so far."""
+        """The current calibration estimates."""
         x = self._x
         uses = self.uses_magnetometer
         return SensorEstimates(
@@ -173,7 +185,7 @@ class SelfCalibratingFilter:
         return self._x[s], self._P[s], self._sums[s], self._counters[s], self._ring[s]
 
     def _check(self, gyr: Floats, acc: Floats, mag: Floats | None) -> tuple[Floats, Floats, Floats]:
-        """The same signals (S, n, 3), each sensor's in one piece."""
+        """The same signals (S, n, 3), contiguous per sensor."""
         if self.uses_magnetometer and mag is None:
             raise EstimationError(
                 "no_magnetometer", "This filter was made for a magnetometer, and the block has no field."
@@ -182,7 +194,14 @@ class SelfCalibratingFilter:
         used = [v for v in (gyr, acc, mag if self.uses_magnetometer else None) if v is not None]
         shapes = {np.shape(v) for v in used}
         if len(shapes) != 1 or len(next(iter(shapes))) != 3 or next(iter(shapes))[1:] != (sensors, 3):
-            raise EstimationError("bad_shape", f"Expected (n, {sensors}, 3) for every signal, got {shapes}.")
+            raise EstimationError(
+                "bad_shape",
+                Message(
+                    "Expected (n, {sensors}, 3) for every signal, got {shapes}.",
+                    sensors=sensors,
+                    shapes=shapes,
+                ),
+            )
         made = [np.ascontiguousarray(np.swapaxes(np.asarray(v, np.float64), 0, 1)) for v in used]
         return made[0], made[1], made[2] if self.uses_magnetometer else np.empty((sensors, 0, 3))
 
@@ -199,7 +218,9 @@ def smooth_orientations(
     mag: Floats | None = None,
     params: SelfCalibratingParams | None = None,
 ) -> SmoothedOrientations:
-    """Orientations of S sensors by their whole recording; parameters, errors as `SelfCalibratingFilter`."""
+    """Orientations of S sensors smoothed over a whole recording; parameters, errors as
+    `SelfCalibratingFilter`.
+    """
     run = SelfCalibratingFilter(rate_hz, np.shape(gyr)[1], params, magnetometer=mag is not None)
     return SmoothedOrientations(run.smooth(gyr, acc, mag), run.estimates)
 
@@ -207,7 +228,7 @@ def smooth_orientations(
 def _judge_both_ways(
     u: Floats, counters: Floats, gyr: Floats, acc: Floats, dt: float
 ) -> tuple[Floats, Bools]:
-    """Motion (n, 3) without a lag, and rest (n,) that is seen from either end."""
+    """Motion (n, 3) without lag, and rest (n,) detected from either end."""
     n = len(gyr)
     judged, still, other = np.empty((n, at.JUDGED)), np.empty(n, np.bool_), np.empty(n, np.bool_)
     judge_motion(u, counters, gyr, acc, dt, judged, still)

@@ -1,4 +1,4 @@
-"""The filter's loops, one sensor: samples, what is learnt at the end of an interval, and the way back.
+"""The filter's loops, one sensor: samples, the update at the end of an interval, and the backward pass.
 
 Equations: docs/science/self-calibrating-filter.md, with the same symbols.
 """
@@ -154,7 +154,7 @@ def add_sample(x, sums, counters, ring, gyr, acc, mag, judged, still, dt, work):
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _add_field(x, sums, counters, ring, mag, dt, middle, w, W, work):  # type: ignore[no-untyped-def]
-    """Add the field, turned level by the orientation of the time it was measured at."""
+    """Add the field, levelled by the orientation at the time of its measurement."""
     at = counters[C_SEEN] % RING
     for j in range(4):
         ring[at, j] = middle[j]
@@ -190,10 +190,11 @@ def _add_field(x, sums, counters, ring, mag, dt, middle, w, W, work):  # type: i
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # type: ignore[no-untyped-def]
-    """End an interval: predict P, take velocity, field and rest, put the errors into x; sums begin anew.
+    """End an interval: propagate P, update with velocity, field and rest, inject the errors into x; reset the
+    sums.
 
-    Writes F (6, m), d (m,) the errors found, decay (1,), and P before and after the prediction where there is
-    room for them.
+    Writes F (6, m), d (m,) the estimated errors, decay (1,), and P before and after the propagation if arrays
+    are given.
     """
     m = P.shape[0]
     n = counters[C_INTERVAL]
@@ -267,9 +268,9 @@ def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # t
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _is_back(x, P, sums, counters, duration):  # type: ignore[no-untyped-def]
-    """Whether the sensor, for `PLACE_S` at rest, is where it started at rest; writes its level field into x.
+    """Whether the sensor, at rest for `PLACE_S`, is where it started at rest; writes its level field to x.
 
-    Judged once a rest, that of the start too.
+    Evaluated once per rest, including the initial one.
     """
     if x[PLACE_SUMS] < 0.0 or counters[C_MAG] == 0 or x[MOVED] > 0.0:
         return False
@@ -291,13 +292,17 @@ def _is_back(x, P, sums, counters, duration):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _turned_since_start(x, sums, counters, j, i):  # type: ignore[no-untyped-def]
-    """Element j, i of the interval's mean orientation less that of the start: what iron adds to the field."""
+    """Element j, i of the interval's mean orientation minus that at the start: the field added by hard
+    iron.
+    """
     return sums[S_MAG_R + 3 * j + i] / counters[C_MAG] - x[START_R + 3 * j + i]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay, off):  # type: ignore[no-untyped-def]
-    """Let the field's deviation change, judge whether a magnet came or went; write off (3,) and its noise."""
+    """Propagate the field's deviation, detect magnets that appear or disappear; write off (3,) and its
+    noise.
+    """
     for j in range(3):
         P[FIELD + j, FIELD + j] += p.field_sd**2 * (1.0 - decay * decay)
         x[FIELD + SHIFT + j] *= decay
@@ -333,7 +338,7 @@ def _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay, off
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _part_from_start(x, P, p):  # type: ignore[no-untyped-def]
-    """Count the iron that was in the start's reading to the region: a new magnet was not in it."""
+    """Attribute the iron in the initial reading to the region: a new magnet was not part of it."""
     for j in range(3):
         for i in range(3):
             x[REGION + SHIFT + j] -= x[START_R + 3 * j + i] * x[IRON + SHIFT + i]
@@ -347,8 +352,8 @@ def run_forward(  # type: ignore[no-untyped-def]
 ):
     """Advance one sensor over a block and write q (n, 4).
 
-    raw (n, 4), F, d, decay, before, after, an entry for each interval: the record for the way back, all empty
-    where none is wanted.
+    raw (n, 4), F, d, decay, before, after, an entry for each interval: the record for the backward pass, all
+    empty if not required.
     """
     m = P.shape[0]
     uses_mag, recorded, k = m == WITH_MAG, len(F) > 0, 0
@@ -403,9 +408,9 @@ def run_forward(  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def smooth_backward(interval, raw, F, d, decay, before, after, out):  # type: ignore[no-untyped-def]
-    """Carry later knowledge back over the intervals (Rauch, Tung and Striebel) and write out (n, 4).
+    """Backward smoothing over the intervals (Rauch, Tung and Striebel); writes out (n, 4).
 
-    Samples after the last whole interval stay as they are.
+    Samples after the last whole interval are unchanged.
     """
     m = before.shape[1]
     error, end, y, z, L = np.zeros(m), np.empty(m), np.empty(m), np.empty(m), np.empty((m, m))

@@ -1,4 +1,4 @@
-"""Where each quantity stands in the arrays of the compiled loops."""
+"""Layout of the arrays of the compiled loops."""
 
 # The error state. World axes unless said; orientation e: R_true = Exp(e) R.
 TILT = 0  # 3, orientation, rad

@@ -1,4 +1,4 @@
-"""How fast a sensor moves about its place, and whether it rests: compiled, one sensor."""
+"""Speed of a sensor about its position, and rest detection: compiled, one sensor."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from sagittal.core.rotation import compiled
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def face_up(force, field, q):  # type: ignore[no-untyped-def]
-    """Write q (4,) that turns force (3,) upright and field (3,), unless it is zero, to the north."""
+    """Write q (4,) that aligns force (3,) with up and field (3,), unless it is zero, with north."""
     n = np.sqrt(force[0] ** 2 + force[1] ** 2 + force[2] ** 2)
     q[0], q[1], q[2], q[3] = 1.0, 0.0, 0.0, 0.0
     if n < 1e-9:
@@ -58,7 +58,7 @@ def face_up(force, field, q):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def tilt(q, a, b, c):  # type: ignore[no-untyped-def]
-    """Turn q (4,) in place by the rotation vector (a, b, c) of the world, rad: q ← Exp((a, b, c)) ⊗ q."""
+    """Rotate q (4,) in place by the rotation vector (a, b, c) in world axes, rad: q ← Exp((a, b, c)) ⊗ q."""
     square = a * a + b * b + c * c
     if square > 1e-16:
         angle = np.sqrt(square)
@@ -74,8 +74,8 @@ def tilt(q, a, b, c):  # type: ignore[no-untyped-def]
 def judge_motion(u, counters, gyr, acc, dt, judged, still):  # type: ignore[no-untyped-def]
     """Advance the state u (22,) and write judged (n, 3), see the layout, and still (n,), True at rest.
 
-    The speed is integrated from the acceleration without its slow part and has its own slow part taken off:
-    what is left is motion about a place. Samples that are not numbers change nothing and are no rest.
+    The speed is integrated from the acceleration without its slow part and then high-passed again: the result
+    is motion about a fixed position. Non-finite samples have no effect and do not count as rest.
     """
     q, R = u[M_Q : M_Q + 4], np.empty((3, 3))
     k = 1.0 - exp(-dt / MOTION_TIME_S)
@@ -128,7 +128,7 @@ def judge_motion(u, counters, gyr, acc, dt, judged, still):  # type: ignore[no-u
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def average_backwards(x, dt):  # type: ignore[no-untyped-def]
-    """Average x (n,) in place from the end on: with the forward mean before, it lags nowhere."""
+    """Average x (n,) in place from the end backward: combined with the forward mean it has no lag."""
     k = 1.0 - exp(-dt / INTENSITY_TIME_S)
     mean = x[-1]
     for i in range(len(x) - 1, -1, -1):

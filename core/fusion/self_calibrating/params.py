@@ -1,4 +1,4 @@
-"""What a sensor and its surroundings are expected to be; the figures that only shape the computation."""
+"""Expected properties of a sensor and its environment; numbers that only shape the computation."""
 
 from __future__ import annotations
 
@@ -8,22 +8,23 @@ from typing import Final, NamedTuple
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 
 
 @dataclass(frozen=True)
 class SelfCalibratingParams:
-    """The parameters that a result depends on; docs/science/self-calibrating-filter.md, "Parameters".
+    """The parameters that affect the result; docs/science/self-calibrating-filter.md, "Parameters".
 
     Parameters
     ----------
     velocity_gain : standard deviation of the velocity, in multiples of the measured speed of the motion.
-    gyro_noise : rad/√s. gyro_rate_noise : √s, orientation noise per angular rate: what the gyroscope's matrix
-        cannot describe. gyro_matrix_sd : of scale and misalignment.
+    gyro_noise : rad/√s. gyro_rate_noise : √s, orientation noise per angular rate, not described by the
+        gyroscope matrix. gyro_matrix_sd : of scale and misalignment.
     gyro_bias_sd : rad/s at the start. gyro_bias_walk : rad/s/√s. acc_bias_sd : m/s².
-    field_sd : the magnetic field of a place less that of its region, and of the region less that of the
-        start, in norms of the field. field_length_m : way over which the place's changes. hard_iron_sd : in
-        norms of the field.
-    mag_delay_s, mag_delay_sd_s : the magnetometer is late by, and how surely; the delay is estimated.
+    field_sd : local magnetic field minus that of its region, and field of the region minus that at the start,
+        relative to the field norm. field_length_m : distance over which the local field changes.
+        hard_iron_sd : relative to the field norm.
+    mag_delay_s, mag_delay_sd_s : prior delay of the magnetometer and its uncertainty; the delay is estimated.
     """
 
     velocity_gain: float = 1.0
@@ -44,12 +45,18 @@ class SelfCalibratingParams:
             least = -0.02 if name == "mag_delay_s" else 0.0
             if not isfinite(value) or value < least or (value == 0.0 and name == "field_length_m"):
                 raise ParameterError(
-                    "parameter_out_of_range", f"{name} = {value:g}; expected a number of {least:g} or more."
+                    "parameter_out_of_range",
+                    Message(
+                        "{name} = {value:g}; expected a number of {least:g} or more.",
+                        name=name,
+                        value=value,
+                        least=least,
+                    ),
                 )
 
 
 class KernelWeights(NamedTuple):
-    """The parameters in the order of `SelfCalibratingParams`, as the compiled loops take them."""
+    """The parameters in the order of `SelfCalibratingParams`, for the compiled loops."""
 
     velocity_gain: float
     gyro_noise: float
@@ -66,7 +73,7 @@ class KernelWeights(NamedTuple):
 
 
 def make_weights(params: SelfCalibratingParams) -> KernelWeights:
-    """The same numbers for the compiled loops."""
+    """The parameters as a tuple for the compiled loops."""
     return KernelWeights(*(float(x) for x in astuple(params)))
 
 

@@ -1,4 +1,4 @@
-"""The first orientation of a sensor, at rest or in motion: compiled, one sensor.
+"""Initial orientation of a sensor, at rest or in motion: compiled, one sensor.
 
 Equations: docs/science/self-calibrating-filter.md, "Start, and both ways".
 """
@@ -60,16 +60,16 @@ from sagittal.core.rotation import compiled
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def is_known(v):  # type: ignore[no-untyped-def]
-    """Whether all of v (3,) are numbers and not all are zero."""
+    """Whether all of v (3,) are finite and not all are zero."""
     total = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     return np.isfinite(total) and total > 0.0
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def take_start(x, P, p, dt, counters, gyr, acc, mag):  # type: ignore[no-untyped-def]
-    """Take a sample of the start: mean force and field in the axes of the first sample, turned along.
+    """Process a sample of the initial phase: mean force and field in the axes of the first sample.
 
-    Writes the present orientation into x; when it is over True, and P and the nominal state are set.
+    Writes the current orientation to x; returns True at its end, with P and the nominal state set.
     """
     uses_mag = P.shape[0] == WITH_MAG
     R, q = np.empty((3, 3)), x[TURNED : TURNED + 4]
@@ -109,7 +109,7 @@ def take_start(x, P, p, dt, counters, gyr, acc, mag):  # type: ignore[no-untyped
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def expect_start(x, P, p, moving):  # type: ignore[no-untyped-def]
-    """Set the nominal calibration and the first covariance."""
+    """Set the nominal calibration and the initial covariance."""
     k = START_MOVING**2 if moving else 1.0
     P[:] = 0.0
     x[GRAVITY + SHIFT] = GRAVITY_MPS2
@@ -132,9 +132,11 @@ def expect_start(x, P, p, moving):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def expect_field(x, P, p, moving):  # type: ignore[no-untyped-def]
-    """Set the first covariance of iron, place and region, and of the heading that was read from the field.
+    """Set the initial covariance of hard iron, local and regional field, and of the heading derived from the
+    field.
 
-    At rest place and region together are what was read, up to the noise of its mean, with the iron as it lay.
+    At rest the sum of local and regional field equals the reading, up to the noise of its mean, with the iron
+    in its initial orientation.
     """
     north = x[NORTH + 1]
     noise = MAG_NOISE**2 / (START_MOVING_S if moving else START_S)
@@ -158,7 +160,7 @@ def expect_field(x, P, p, moving):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def start_from_first(x, P, p, dt, counters, gyr, acc, mag):  # type: ignore[no-untyped-def]
-    """Find the start of a whole recording, seen from its first sample."""
+    """Determine the initial state of a whole recording, at its first sample."""
     none = np.zeros(3)
     for i in range(len(gyr)):
         if is_known(gyr[i]) or is_known(acc[i]):

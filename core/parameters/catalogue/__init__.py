@@ -1,7 +1,8 @@
-"""The one catalogue of parameters: what each is, its unit, words, reference and limits, in the tables' order.
+"""The single catalogue of parameters: definition, unit, texts, reference and limits, in the order of the
+tables.
 
-Reports, forms, the API's documentation, files, docs/reference/parameters.md and the live pages read it;
-nothing else declares a parameter. docs/how-to/contributing.md says how to add one.
+Used by reports, forms, API documentation, files, docs/reference/parameters.md and the live pages; parameters
+are declared nowhere else. docs/how-to/contributing.md explains how to add one.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from sagittal.core.parameters.catalogue.entry import (
 
 
 def index_entries(entries: Iterable[ParameterEntry]) -> dict[str, ParameterEntry]:
-    """Index entries by name; ValueError for a name that occurs twice."""
+    """Index entries by name; ValueError for a duplicate name."""
     index: dict[str, ParameterEntry] = {}
     for entry in entries:
         if entry.name in index:
@@ -58,23 +59,22 @@ index_entries((*CATALOGUE.values(), *LIMIT_FIGURES.values()))
 
 
 def find_entry(name: str) -> ParameterEntry | None:
-    """Return the entry of a parameter or of a figure of a rule; None for an unknown name."""
+    """The entry of a parameter or of a value used only in a rule; None for an unknown name."""
     return CATALOGUE.get(name) or LIMIT_FIGURES.get(name)
 
 
 def require_entries(names: Iterable[str], user: str) -> None:
-    """Check that a registry names only figures of the catalogue.
+    """Check that a registry uses only names of the catalogue.
 
     Called where the registry is built, so that an unknown name fails at import and not on a page.
 
     Parameters
     ----------
-    user : the registry, for the message.
+    user : name of the registry, for the message.
 
     Raises
     ------
-    ValueError
-        Naming the registry and every name without an entry.
+    ValueError With the registry and every name without an entry.
     """
     unknown = sorted({name for name in names if find_entry(name) is None})
     if unknown:
@@ -84,22 +84,22 @@ def require_entries(names: Iterable[str], user: str) -> None:
 
 
 def list_names(group: str, of: Scope = "stride") -> tuple[str, ...]:
-    """Names of one group in the order of the tables: those of every stride, or those of the whole take."""
+    """Names of one group in the order of the tables: per stride, or for the whole recording."""
     return tuple(name for name, entry in CATALOGUE.items() if (entry.group, entry.of) == (group, of))
 
 
 def list_trainable() -> tuple[str, ...]:
-    """Parameters of a single stride that a prescription may train."""
+    """Parameters of a single stride that can be trained."""
     return tuple(name for name, entry in CATALOGUE.items() if entry.trainable)
 
 
 def list_curve_figures() -> dict[str, CurveFigure]:
-    """Parameters that are read from the cycle curves, and how."""
+    """Parameters read from the cycle curves, and how."""
     return {name: entry.curve for name, entry in CATALOGUE.items() if entry.curve is not None}
 
 
 def name_counted(name: str) -> str:
-    """Name what a parameter is the mean of: "strides" unless the catalogue says otherwise."""
+    """The unit of counting for a parameter's mean: "strides" unless the catalogue defines another."""
     entry = CATALOGUE.get(name)
     return "strides" if entry is None else entry.counted
 

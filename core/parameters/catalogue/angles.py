@@ -1,4 +1,4 @@
-"""Angles read from the cycle curves, and of the foot to the floor (core/parameters/kinematic.py)."""
+"""Angles read from the cycle curves, and foot-to-floor angles (core/parameters/kinematic.py)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Daily life, from one sensor of the trunk (core/activity/parameters.py)."""
+"""Daily life, from one trunk sensor (core/activity/parameters.py)."""
 
 from __future__ import annotations
 

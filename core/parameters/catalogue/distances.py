@@ -1,4 +1,4 @@
-"""Speed and distances: between the flats of the feet (core/parameters/spatial.py)."""
+"""Speed and distances, between foot-flat positions (core/parameters/spatial.py)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the catalogue says of a parameter, and the words that several of them share."""
+"""Catalogue entry of a parameter, and texts shared by several of them."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ UNITS: Final[Mapping[str, tuple[str, str]]] = {
 
 @dataclass(frozen=True)
 class CurveFigure:
-    """A statistic of one cycle curve between two percentages of the stride, both included."""
+    """A statistic of one cycle curve between two percentages of the stride, inclusive."""
 
     variable: str
     statistic: Literal["at", "max", "min", "range"]
@@ -98,12 +98,12 @@ class CurveFigure:
 
 @dataclass(frozen=True)
 class NormKey:
-    """Where the reference of a parameter stands (core/norms/values.py).
+    """Location of a parameter's reference (core/norms/values.py).
 
     Parameters
     ----------
     table : "angles" of the adults of the cycle curves, "walkway" by age and sex. row : its name there.
-    differs : what is measured differently, so that values cannot be compared: "ankles".
+    differs : difference in measurement that makes values incomparable: "ankles".
     """
 
     table: Literal["angles", "walkway"]
@@ -113,25 +113,25 @@ class NormKey:
 
 @dataclass(frozen=True)
 class ParameterEntry:
-    """Everything that is said of one parameter, wherever it is shown.
+    """Definition and presentation of one parameter, wherever it is displayed.
 
     Parameters
     ----------
-    name : field term that ends with its unit. label : as printed. group : heading in tables.
+    name : field term ending with its unit. label : as printed. group : heading in tables.
     digits : decimals as printed. scale : fixed ends of its range bar, in its unit.
-    comparison : words for the larger and the smaller of two values. definition : one or two plain sentences.
-    needs : what it cannot be measured without, beside contacts.
-    of : "stride" = of every stride, by side; "take" = of the whole take only, squats by side.
-    counted : what it is the mean of.
-    curve : how it is read from a cycle curve; such a parameter needs no code of its own.
-    trainable : a prescription may train it. everyday : what a patient reads in place of the label.
-    shared : both sides of a steady walk have the same value, so neither is trained alone.
-    better : of two sides the one that the other is trained towards (our choice); None = neither by itself.
-    is_length : the patient's screen may show it as a way on the floor.
-    plausible : least and greatest value that a person can have; beyond, it is an error of detection.
+    comparison : wording for the larger and the smaller of two values. definition : one or two plain
+        sentences.
+    needs : requirements other than contacts.
+    of : "stride" = for every stride, by side; "take" = only for the whole recording, squats by side.
+        counted : unit of counting for its mean.
+    curve : how it is read from a cycle curve; such a parameter needs no further code.
+    trainable : can be trained with feedback. everyday : patient-friendly label.
+    shared : equal on both sides in steady walking, so neither side is trained alone.
+    better : which of two sides serves as the training target for the other (our choice); None = neither.
+    is_length : can be displayed to the patient as a distance on the floor.
+    plausible : minimum and maximum of physiological values; others are detection errors.
     norm : its reference, None without one. change : its limits of change (core/change/limits.py), None
-        where no source has one.
-    errors : what its measurement is known to; None = not known, then no uncertainty is stated.
+        without a source. errors : its measurement uncertainty; None = unknown, no uncertainty is reported.
     """
 
     name: str
@@ -159,15 +159,15 @@ class ParameterEntry:
 
     @property
     def unit(self) -> str:
-        """Unit in files, "" for a ratio or a number of things."""
+        """Unit in files, "" for a ratio or a count."""
         return unit_of(self.name)
 
     @property
     def target_range(self) -> tuple[float, float]:
-        """Least and greatest value that may be entered as a target.
+        """Minimum and maximum that may be entered as a target.
 
-        The plausible ones; where none are declared, the range bar and as much again to either side (our
-        choice), below 0 only where the bar goes there.
+        The plausible range; if not declared, the range bar extended by its length to either side (our
+        choice), below 0 only if the bar includes negative values.
         """
         low, high = self.scale
         least, most = 2 * low - high, 2 * high - low
@@ -180,7 +180,7 @@ class ParameterEntry:
 
 
 def unit_of(name: str) -> str:
-    """Unit of any figure by the ending of its name, "" for a ratio."""
+    """Unit from the ending of a name, "" for a ratio."""
     return UNITS.get(_ending(name), ("", ""))[0]
 
 

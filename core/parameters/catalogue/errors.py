@@ -1,7 +1,8 @@
-"""What parameters are known to, beside the spread of their strides (docs/science/uncertainty.md).
+"""Measurement uncertainty of parameters, in addition to the spread of their strides
+(docs/science/uncertainty.md).
 
-Declared here once, by kind of figure, and named by every entry of the catalogue that has one. All figures are
-standard uncertainties in the unit of the parameter, with where they were measured.
+Declared here once, by kind of value, and referenced by the entries of the catalogue. All values are standard
+uncertainties in the unit of the parameter, with the data they were measured on.
 """
 
 from __future__ import annotations
@@ -10,10 +11,12 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Final
 
+from sagittal.core.message import Message
+
 
 @dataclass(frozen=True)
 class ContactWeights:
-    """How the contacts of a stride enter a time: its derivative by each.
+    """Weights of the contacts of a stride in a time: its derivative with respect to each.
 
     Parameters
     ----------
@@ -30,14 +33,13 @@ class ContactWeights:
 
 @dataclass(frozen=True)
 class MeasurementErrors:
-    """What the value of a parameter is known to.
+    """Measurement uncertainty of a parameter.
 
     Parameters
     ----------
-    source : what enters, in words for people.
-    contacts : None where no contact's moment enters.
-    common : error that both sides and every take share: definitions, the body's model.
-    own : error of one side in one take, the same in all of its strides: mounting, calibration, path.
+    source : contributions, in words for users. contacts : None if independent of contact times.
+    common : error common to both sides and all recordings: definitions, body model.
+    own : error of one side in one recording, the same in all of its strides: alignment, calibration, path.
     random : error of a single stride.
     """
 
@@ -68,19 +70,21 @@ _PATH: Final = "path of the feet"
 STRIDE_LENGTH: Final = MeasurementErrors(_PATH, common=0.008, own=0.006, random=0.017)
 """gaitmap_foot −1.5 ± 17 mm and +1.4 ± 12 mm, neura_walk +6 ± 8 mm; the mean of a walk rounded up."""
 STEP_LENGTH: Final = MeasurementErrors(
-    f"{_PATH}, linked through the pelvis", common=0.011, own=0.010, random=0.016
+    Message("{PATH}, linked through the pelvis", PATH=_PATH), common=0.011, own=0.010, random=0.016
 )
 """neura_walk +4 ± 16 mm; virtual people within 25 mm."""
 STEP_WIDTH: Final = MeasurementErrors(
-    f"{_PATH}, linked; width of standing", common=0.015, own=0.012, random=0.010
+    Message("{PATH}, linked; width of standing", PATH=_PATH), common=0.015, own=0.012, random=0.010
 )
 """neura_walk +15 ± 7 mm, and what a ruler between the ankles is read to."""
 CIRCUMDUCTION: Final = MeasurementErrors(_PATH, common=0.010, own=0.006, random=0.004)
 """neura_walk +11 ± 4 mm."""
 HEEL_CLEARANCE: Final = MeasurementErrors(
-    f"{_PATH}, shape of the shoe", common=0.008, own=0.006, random=0.009
+    Message("{PATH}, shape of the shoe", PATH=_PATH), common=0.008, own=0.006, random=0.009
 )
-TOE_CLEARANCE: Final = MeasurementErrors(f"{_PATH}, shape of the shoe", common=0.008, own=0.006, random=0.006)
+TOE_CLEARANCE: Final = MeasurementErrors(
+    Message("{PATH}, shape of the shoe", PATH=_PATH), common=0.008, own=0.006, random=0.006
+)
 """gaitmap_foot +4 ± 9 and +3 ± 6 mm at most, with a shoe's shape found there; a shape by eye adds to it."""
 SPEED: Final = MeasurementErrors(_PATH, common=0.010, own=0.006, random=0.024)
 """gaitmap_foot −8 ± 24 and −1 ± 24 mm/s."""
@@ -91,7 +95,7 @@ def _angle(source: str, common: float, own: float) -> MeasurementErrors:
 
 
 def _range(of: MeasurementErrors) -> MeasurementErrors:
-    """A range is a level less another one; their errors need not be alike."""
+    """Uncertainty of a range, the difference of two levels with possibly different errors."""
     return MeasurementErrors(of.source, None, sqrt(2.0) * of.common, sqrt(2.0) * of.own, of.random)
 
 

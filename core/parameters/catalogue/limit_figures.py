@@ -1,4 +1,4 @@
-"""Figures that only the rules of core/flags read: compared with a limit, without a row in the tables."""
+"""Values used only by the rules of core/flags: compared with a limit, without a row in the tables."""
 
 from __future__ import annotations
 

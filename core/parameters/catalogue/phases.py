@@ -1,4 +1,4 @@
-"""Shares of the stride and parts of stance and swing (temporal.py, stance.py, phases.py)."""
+"""Phases as a percentage of the stride and parts of stance and swing (temporal.py, stance.py, phases.py)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Walks, turns and steps of the whole take (core/parameters/walking.py)."""
+"""Walking bouts, turns and steps of the whole recording (core/parameters/walking.py)."""
 
 from __future__ import annotations
 

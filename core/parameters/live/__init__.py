@@ -1,1 +1,1 @@
-"""Parameters of a walk as it streams."""
+"""Parameters of a walk in real time."""

@@ -1,4 +1,6 @@
-"""Every figure of one stride, by the definitions of the whole take (core/parameters), on a window of it."""
+"""All parameters of one stride on a window of samples, by the definitions for whole recordings
+(core/parameters).
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,7 @@ from sagittal.core.parameters.temporal import explain_missing, temporal_values
 
 @dataclass(frozen=True, eq=False)
 class StrideSpan:
-    """Part of a take that holds a stride, `Oriented` of pelvis and feet.
+    """Part of a recording that contains a stride, `Oriented` of pelvis and feet.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ Figures = tuple[dict[str, Value], dict[str, Floats]]
 
 
 def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures:
-    """All that is known when the contact that ends the stride is; of distances what a belt tells."""
+    """Parameters available at the contact that ends the stride; of distances only those given by a belt."""
     one = Strides((stride,))
     found: dict[str, Value] = {}
     for name, column in temporal_values(one).items():
@@ -93,11 +95,11 @@ def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures
 def late_figures(
     stride: Stride, context: Sequence[Stride], span: StrideSpan, surface: Surface
 ) -> dict[str, Value]:
-    """Figures between the flats, once both feet have left the floor again.
+    """Distances between foot-flats, available once both feet have left the floor again.
 
     Parameters
     ----------
-    context : the strides around it, in order of time.
+    context : the neighbouring strides, in chronological order.
     """
     flats = None
     if span.feet is not None:

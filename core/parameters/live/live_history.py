@@ -1,4 +1,4 @@
-"""The last seconds of everything a stride is measured on, in arrays that slide."""
+"""Ring buffers of the last seconds of all signals required to measure a stride."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST: Final = 64
 
 
 class SampleHistory:
-    """Named columns of the samples 0, 1, 2 …, of which the last are kept.
+    """Named columns of the samples 0, 1, 2 …, of which the last ones are stored.
 
     Parameters
     ----------
@@ -37,16 +37,18 @@ class SampleHistory:
 
     @property
     def length(self) -> int:
-        """Samples so far."""
+        """Number of samples so far."""
         return self._first + self._rows
 
     @property
     def reach(self) -> int:
-        """Samples that are kept however they came."""
+        """Number of samples guaranteed to be stored, regardless of block sizes."""
         return self._kept - MOST
 
     def reaches(self, first: int, past: int) -> bool:
-        """Whether samples first … past − 1 are near enough to `past`, however they came."""
+        """Whether samples first … past − 1 are guaranteed to be stored at `past`, regardless of block
+        sizes.
+        """
         return first >= 0 and past - first <= self.reach
 
     def append(self, columns: Mapping[str, NDArray[np.generic]]) -> None:

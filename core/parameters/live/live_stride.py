@@ -1,4 +1,4 @@
-"""A stride as it is told while samples come. Plain values: nothing here imports numba."""
+"""A stride as reported in real time. Plain values: nothing here imports numba."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ NOT_YET: Final = "not_yet"
 
 @dataclass(frozen=True, eq=False)
 class LiveStride:
-    """One cycle of a foot, told as soon as its second contact is known.
+    """One cycle of a foot, reported as soon as its second contact is known.
 
-    The same stride (same `n`) is told again when the time of that contact is refined, within 0.2 s: its times
-    and shares change by a few hundredths of a second. Distances need the rest of the foot after the contact:
-    where a reason is `not_yet`, it is told once more when they are known, at the latest with the foot's next
-    contact, and is then `complete`. Then no value changes any more.
+    The same stride (same `n`) is reported again when the time of that contact is refined, within 0.2 s: its
+    times and phases change by a few hundredths of a second. Distances require the rest of the foot after the
+    contact: values with the reason `not_yet` are reported once more when available, at the latest with the
+    foot's next contact, and the stride is then `complete`. After that no value changes any more.
 
     Parameters
     ----------
-    n : running number over both feet, from 0. detected_s : last sample that was needed.
+    n : running number over both feet, from 0. detected_s : last sample required.
     values : parameters of a stride as in the stride table (sagittal.core.parameters: temporal, spatial,
-        stance, phases, kinematic), None where undefined. reasons : why, for every None.
-    curves : variable → (101,) rad over the cycle, as `cycle_curves`; only those known throughout.
-    turn_rad : heading change of the foot, left positive. flags : those that are known by then; "first" of a
-        bout and "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`.
-        counted : no flag.
+        stance, phases, kinematic), None if undefined. reasons : for every None.
+    curves : variable → (101,) rad over the cycle, as `cycle_curves`; only complete ones.
+    turn_rad : heading change of the foot, left positive. flags : those known by then; "first" of a bout and
+        "near_turn" after a turn from the start, "last" and "in_place" when it is `complete`. counted : no
+        flag.
     """
 
     n: int

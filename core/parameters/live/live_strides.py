@@ -1,9 +1,9 @@
-"""Contacts → live strides: each told when its second contact is known, and again when that contact is refined
-and when its distances are known.
+"""Contacts → live strides: each reported when its second contact is known, again when that contact is
+refined, and again when its distances are known.
 
-The stride list of a whole take asks the neighbours of a stride whether it counts; here only those before it
-can be asked: not yet whether it is the last. It is told as counted, and told again as not counted when nobody
-steps on, or when its distances say that it led nowhere.
+In the stride list of a whole recording the neighbours of a stride determine whether it is counted; here only
+the earlier ones are available, so it is unknown whether a stride is the last. It is reported as counted, and
+reported again as not counted if no further step follows, or if its distances show that it was in place.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ LATER: Final[frozenset[StrideFlag]] = frozenset(("last", "non_periodic"))
 
 @dataclass(frozen=True)
 class HistoryColumns:
-    """What the columns of the history mean.
+    """Layout of the columns of the history.
 
     Parameters
     ----------
     first : sample 0 on the axis. angles : names of the angle columns. courses : pelvis and feet with a
-        sensor. feet : sides whose path is kept.
+        sensor. feet : sides with a stored path.
     """
 
     first: int
@@ -64,7 +64,7 @@ class HistoryColumns:
 
 @dataclass
 class _Pending:
-    """A stride whose distances are not known yet, and the sample at which they are given up waiting for."""
+    """A stride with pending distances, and the sample at which they are given up."""
 
     told: LiveStride
     stride: Stride
@@ -72,7 +72,7 @@ class _Pending:
 
 
 class LiveStrides:
-    """The strides of a live take, in the order in which they become known."""
+    """The strides of a live recording, in the order in which they become known."""
 
     def __init__(self, setup: HistoryColumns, params: StrideParams | None = None) -> None:
         self._setup, self._params = setup, params or StrideParams()
@@ -84,7 +84,7 @@ class LiveStrides:
         self._near = ceil(NEAR_S * setup.rate_hz) + 1
 
     def push(self, known: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
-        """Strides that the contacts known since the last call, or the mere time since then, complete."""
+        """Strides completed by the contacts since the last call, or by the time elapsed."""
         told: list[LiveStride] = []
         for at, event, final in known:
             told += self._given_up(at, history)
@@ -101,7 +101,7 @@ class LiveStrides:
         return told + self._given_up(history.length - 1, history)
 
     def _refined(self, at: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
-        """The stride that this contact ended, with its refined end."""
+        """The stride ended by this contact, with its refined end."""
         for i, e in enumerate(self._events):
             if (e.side, e.kind, e.time_s) == (event.side, event.kind, event.first_s):
                 self._events[i] = event
@@ -116,7 +116,9 @@ class LiveStrides:
     def _landed(
         self, at: int, event: GaitEvent, history: SampleHistory, refined: bool, number: int | None = None
     ) -> list[LiveStride]:
-        """The stride that this contact ends, if it began within reach; `number`: of one told before."""
+        """The stride ended by this contact, if its start is within reach; `number`: of one reported
+        before.
+        """
         own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
         if len(own) < 2 or own[-2] == own[-1]:  # two contacts may be refined to the same moment
             return []
@@ -164,13 +166,13 @@ class LiveStrides:
         return [self._complete(p, at, history) for p in ready]
 
     def _given_up(self, at: int, history: SampleHistory) -> list[LiveStride]:
-        """Those nobody steps on after: a stop. Each at its own sample, whatever the blocks are."""
+        """Strides without a following step: a stop. Each at its own sample, independent of block sizes."""
         ready = sorted((p for p in self._pending if p.until <= at), key=lambda p: p.until)
         self._pending = [p for p in self._pending if p.until > at]
         return [self._complete(p, p.until, history, *self._stopped(p.stride)) for p in ready]
 
     def _stopped(self, stride: Stride) -> tuple[StrideFlag, ...]:
-        """The foot has not been heard of since: nobody walked on, only the other one may be missing."""
+        """Flag "last" if this foot has made no further contact; only the other foot may be missing."""
         on = any(e.side == stride.side and e.time_s > stride.end_s for e in self._events)
         return () if on else ("last",)
 
@@ -196,7 +198,9 @@ class LiveStrides:
         )
 
     def _left_again(self, stride: Stride) -> bool:
-        """Both feet that the distances rest on have been lifted, or landed again, since their flats."""
+        """Whether both feet used for the distances have left the floor, or landed again, since their
+        foot-flats.
+        """
 
         def moved(side: Side, since: float) -> bool:
             return any(e.side == side and e.time_s > since for e in self._events)
@@ -207,7 +211,7 @@ class LiveStrides:
         )
 
     def _context(self, since: float) -> list[Stride]:
-        """Strides of both feet that end later, and what is known of those that have begun."""
+        """Strides of both feet that end later, and those that have only begun."""
         found = []
         for side in self._setup.feet:
             contacts = [e.time_s for e in self._events if e.side == side and e.kind == "ic"]
@@ -232,7 +236,7 @@ class LiveStrides:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
 
     def _turned_feet(self, first: int, past: int, history: SampleHistory) -> Orientations:
-        """Orientations of both feet over samples first … past − 1, and where they are known."""
+        """Orientations of both feet over samples first … past − 1, and their validity."""
         x = self._setup
         first = max(first, past - history.reach)
         t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
@@ -242,11 +246,11 @@ class LiveStrides:
         return Orientations(t_s, x.rate_hz, by_segment, {s: valid[:, i] for s, i in feet.items()}, "live")
 
     def _span(self, first: int, past: int, history: SampleHistory, side: Side | None = None) -> StrideSpan:
-        """Samples first … past − 1 as the functions of a whole take want them.
+        """Samples first … past − 1 in the form required by the functions for whole recordings.
 
         Parameters
         ----------
-        side : of the foot whose orientation and the pelvis's are wanted, and all angles; None = no angles.
+        side : include the orientation of this foot and of the pelvis, and all angles; None = no angles.
         """
         x = self._setup
         t_s = np.arange(x.first + first, x.first + past) / x.rate_hz
@@ -284,6 +288,6 @@ class LiveStrides:
 
 
 def _split(found: Mapping[str, Value]) -> tuple[dict[str, float | None], dict[str, str]]:
-    """Values, None where there is a reason; and the reasons."""
+    """Values, None for those with a reason; and the reasons."""
     values = {name: v if isinstance(v, float) else None for name, v in found.items()}
     return values, {name: v for name, v in found.items() if isinstance(v, str)}

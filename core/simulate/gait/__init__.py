@@ -1,1 +1,1 @@
-"""How a simulated person walks: feet, pelvis, legs, timing, soft tissue."""
+"""Gait of a simulated person: feet, pelvis, legs, timing, soft tissue."""

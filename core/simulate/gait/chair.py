@@ -1,7 +1,7 @@
-"""A chair under a walker: where the pelvis is while sitting, rising and sitting down, and how the trunk leans
+"""A chair for a walker: position of the pelvis and lean of the trunk in sitting, rising and sitting down
 (docs/science/simulation.md, "Timed up and go").
 
-The feet stay where they stand; the legs follow by the same inverse kinematics as in walking.
+The feet do not move; the legs follow by the same inverse kinematics as in walking.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ DROP, BACK = 0.95, 0.95
 
 @dataclass(frozen=True)
 class ChairChange:
-    """One rise from the chair or one way down to it."""
+    """One rise from the chair or one sitting down."""
 
     kind: Literal["sit_to_stand", "stand_to_sit"]
     start_s: float
@@ -45,11 +45,11 @@ class ChairChange:
 
 @dataclass(frozen=True, eq=False)
 class SeatMotion:
-    """What the chair adds to a walker's pelvis and trunk; all (n,).
+    """Contribution of the chair to a walker's pelvis and trunk; all (n,).
 
     Parameters
     ----------
-    drop, back : of the hips, in lengths of the thigh. pelvis_rad, chest_rad : added forward lean.
+    drop, back : displacement of the hips, in thigh lengths. pelvis_rad, chest_rad : added forward lean.
     """
 
     drop: Floats
@@ -59,7 +59,7 @@ class SeatMotion:
 
 
 def sit_and_rise(t: Floats, changes: tuple[ChairChange, ...]) -> SeatMotion:
-    """Follow the changes in order of time; before a rise the person sits."""
+    """Apply the transitions in chronological order; before a rise the person is seated."""
     begins = 1.0 if changes and changes[0].kind == "sit_to_stand" else 0.0
     low, back, seated, lean = (
         np.full(len(t), begins),

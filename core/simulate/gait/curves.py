@@ -1,9 +1,9 @@
-"""Target curves of healthy gait over the own-side gait cycle, as Fourier series.
+"""Target curves of healthy gait over the gait cycle of the same side, as Fourier series.
 
 Pelvis and hip adduction are fits of the WBDS adult means (Fukuchi 2018, n = 42; rotation and obliquity made
 antisymmetric, tilt symmetric between the sides). Hip, knee, ankle and foot pitch are WBDS fits plus
-corrections fitted once, so that the *resulting* curves meet the WBDS means at step 0.64 m, 0.54 s: they are
-commands, not the curves that come out (docs/science/simulation.md, "Target curves").
+corrections fitted once, so that the *resulting* curves match the WBDS means at step 0.64 m, 0.54 s: they are
+inputs, not the resulting curves (docs/science/simulation.md, "Target curves").
 """
 
 from __future__ import annotations

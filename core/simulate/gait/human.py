@@ -28,7 +28,7 @@ HINGE_FROM_PELVIS = 0.65
 
 @dataclass(frozen=True, eq=False)
 class BodyPath:
-    """Where each segment is and how it is turned, on a fine grid.
+    """Position and orientation of each segment on a fine grid.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class Motion(BodyPath):
     Parameters
     ----------
     timings : side → events of each swing. sole_height : side → (n,) lowest sole point, m.
-    guard_m : largest lowering of the pelvis because a leg would have been too short.
-    lifts_m : side → lift of each swing added for clearance; it costs knee flexion.
-    heading_rad : (n,) of the path, unwrapped, without the pelvis' own rotation.
+    guard_m : largest lowering of the pelvis for a leg that would have been too short. lifts_m : side → lift
+        of each swing added for clearance, which changes knee flexion.
+    heading_rad : (n,) of the path, unwrapped, without pelvic rotation.
     """
 
     rate_hz: float
@@ -63,15 +63,15 @@ class Motion(BodyPath):
 
 
 def move(plan: Plan, walker: Walker, rate_hz: float, chair: tuple[ChairChange, ...] = ()) -> Motion:
-    """Work out the poses of a plan on a grid of `rate_hz` (400 Hz or more is meant).
+    """Compute the poses of a plan on a grid of `rate_hz` (400 Hz or more intended).
 
     Parameters
     ----------
-    chair : rises and ways down while the plan stands.
+    chair : rises and sitting down during standing periods of the plan.
 
     Raises
     ------
-    ParameterError : "step_too_long" when a leg cannot reach where the plan puts it.
+    ParameterError : "step_too_long" if a leg cannot reach the planned position.
     """
     t = np.arange(round(plan.duration_s * rate_hz) + 1) / rate_hz
     timings = {s: foot_timing(plan, walker, s) for s in SIDES}
@@ -116,7 +116,7 @@ def move(plan: Plan, walker: Walker, rate_hz: float, chair: tuple[ChairChange, .
 
 
 def _touching(t: Floats, timing: FootTiming, margin_s: float) -> Bools:
-    """Samples (n,) at which the foot is on the floor, widened by a margin."""
+    """Samples (n,) with the foot on the floor, widened by a margin."""
     free = np.zeros(len(t), bool)
     for release, contact in zip(timing.release, timing.contact, strict=True):
         free[
@@ -168,7 +168,7 @@ def _leg(
 
 
 def _knee_angle(thigh: float, shank: float, length: Floats) -> Floats:
-    """Knee flexion (n,) in rad of a leg that is `length` (n,) from hip to ankle: the inverse of leg_reach."""
+    """Knee flexion (n,) in rad of a leg with hip-ankle distance `length` (n,): the inverse of leg_reach."""
     return np.asarray(np.arccos((length**2 - thigh**2 - shank**2) / (2.0 * thigh * shank)))
 
 

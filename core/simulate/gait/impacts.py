@@ -1,7 +1,8 @@
-"""The shock of contact: every sensor of the leg and the pelvis shakes on its segment for a tenth of a second.
+"""Impacts at contact: vibration of every sensor of the leg and the pelvis relative to its segment for a tenth
+of a second.
 
-It is given as motion of the sensor, so acceleration, rate and pose belong together; the segment itself does
-not notice. Size and rhythm resemble shoes on a hard floor, they are not measured ones
+It is modelled as motion of the sensor, so acceleration, rate and pose are consistent; the segment itself is
+not affected. Amplitude and frequency resemble shoes on a hard floor, they are not measured
 (docs/science/simulation.md, "Impacts").
 """
 
@@ -20,12 +21,12 @@ from sagittal.core.simulate.gait.human import Motion
 
 @dataclass(frozen=True)
 class Shake:
-    """How one kind of segment answers a contact of strength 1.
+    """Response of a kind of segment to a contact of strength 1.
 
     Parameters
     ----------
-    acc : upward, m/s², and rate, rad/s about the segment's z axis, of an endless oscillation; the short fade
-        of the real one makes its peaks up to 1.45 times that.
+    acc : upward, m/s², and rate, rad/s about the segment's z axis, of an undamped oscillation; the short
+        decay of the actual one makes its peaks up to 1.45 times larger.
     hz : of the oscillation. delay_s, duration_s : after the contact.
     """
 
@@ -61,7 +62,7 @@ PEAK: Final = 1.0 / 3.0
 
 @dataclass(frozen=True)
 class Impact:
-    """One contact: of which foot, when it comes and when the foot is flat (s), heading (rad), strength."""
+    """One contact: foot, time of contact and of foot-flat (s), heading (rad), strength."""
 
     side: Side
     time_s: float
@@ -71,7 +72,7 @@ class Impact:
 
 
 def draw_impacts(motion: Motion, rng: np.random.Generator) -> tuple[Impact, ...]:
-    """One impact per step, harder the faster the person steps."""
+    """One impact per step, stronger for faster steps."""
     impacts = []
     for side in SIDES:
         timing = motion.timings[side]
@@ -86,7 +87,7 @@ def draw_impacts(motion: Motion, rng: np.random.Generator) -> tuple[Impact, ...]
 def shake_sensor(t: Floats, segment: Segment, impacts: tuple[Impact, ...]) -> tuple[Floats, Floats]:
     """Displacement (n, 3) in m in the world and turn (n,) in rad about the segment's z axis of its sensor.
 
-    Both are exactly zero from foot-flat on for a foot, and once the shake is over for the others.
+    Both are exactly zero from foot-flat on for a foot, and after the vibration for the others.
     """
     shift, turn = np.zeros((len(t), 3)), np.zeros(len(t))
     shake = SHAKES[segment.split("_")[0]]

@@ -1,6 +1,6 @@
-"""The pelvis: its way over the floor, its angles, and its height from the knee of the loaded leg.
+"""The pelvis: its horizontal path, its angles, and its height from the knee of the loaded leg.
 
-Height from the loaded knee (not from a fixed vertical wave) is what brings the stance knee to the norm
+Height from the loaded knee (not from a fixed vertical wave) brings the stance knee to the norm
 (docs/science/simulation.md, "Pelvis").
 """
 
@@ -36,9 +36,9 @@ def hip_offset(walker: Walker, side: Side) -> Floats:
 def floor_path(
     t: Floats, plan: Plan, walker: Walker, phase: Floats, amplitude: Floats, rate_hz: float
 ) -> tuple[Floats, Floats]:
-    """Mid-hip on the floor plane (n, 2) in m, and heading of the path (n,) in rad, unwrapped.
+    """Horizontal position of mid-hip (n, 2) in m, and heading of the path (n,) in rad, unwrapped.
 
-    Knots at each contact (middle of the feet, a little ahead) and at mid-step (towards the stance foot).
+    Knots at each contact (midpoint of the feet, slightly ahead) and at mid-step (towards the stance foot).
     """
     feet = {s: np.array([plan.footprints[s][0].x_m, plan.footprints[s][0].y_m]) for s in SIDES}
     headings = dict.fromkeys(SIDES, 0.0)
@@ -81,7 +81,7 @@ def orient_pelvis(
 
     Parameters
     ----------
-    phase : (n,) of the body. phases : side → (n,) of that leg, for a hiked pelvis.
+    phase : (n,) of the body. phases : side → (n,) of that leg, for pelvic hiking.
     """
     yaw = heading + amplitude * (walker.rotation_factor * PELVIS_ROTATION(phase))
     right_up = walker.obliquity_factor * PELVIS_OBLIQUITY(phase)
@@ -95,7 +95,7 @@ def orient_pelvis(
 
 
 def load_share(t: Floats, plan: Plan, timings: Mapping[Side, FootTiming], side: Side) -> Floats:
-    """Share (n,) of body weight on one leg, 0 to 1: shifts over double support, one half while standing."""
+    """Fraction (n,) of body weight on one leg, 0 to 1: shifts in double support, one half in standing."""
     swings = dict.fromkeys(SIDES, 0)
     shifts: list[tuple[float, float, float]] = []
     for step in plan.steps:
@@ -125,7 +125,7 @@ def compute_pelvis_height(
     ankles: Mapping[Side, Floats],
     rate_hz: float,
 ) -> Floats:
-    """Mid-hip height (n,) in m that gives the loaded leg its target knee flexion."""
+    """Mid-hip height (n,) in m at which the loaded leg has its target knee flexion."""
     total = np.zeros(len(q))
     for side in SIDES:
         rest, gait = walker.standing_knee_rad, walker.sides[side]
@@ -145,7 +145,9 @@ def guard(
     where: Mapping[Side, Bools],
     rate_hz: float,
 ) -> tuple[Floats, float]:
-    """Lower the pelvis (n,) where a leg would be overstretched; also returns the largest need in m."""
+    """Lower the pelvis (n,) where a leg would be overstretched; also returns the largest lowering required
+    in m.
+    """
     excess = np.zeros(len(z))
     for side in SIDES:
         reach = leg_reach(walker.anatomy, walker.sides[side].knee_min_rad - 0.5 * DEGREE)

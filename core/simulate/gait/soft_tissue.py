@@ -1,7 +1,7 @@
-"""Skin and muscle under a sensor: thigh and shank sensors turn and slide a little as hip and knee bend.
+"""Soft tissue under a sensor: thigh and shank sensors rotate and shift slightly as hip and knee flex.
 
 A deterministic function of the joint angles, zero in standing (docs/science/simulation.md, "Soft tissue"; its
-size is a judgement, real artefacts differ between people and places).
+amplitude is an assumption, real artefacts differ between people and locations).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SHANK_SHARE: Final = 0.6
 
 @dataclass(frozen=True)
 class SoftTissue:
-    """Size of the artefact for a right angle at the knee.
+    """Amplitude of the artefact at 90° of knee flexion.
 
     Parameters
     ----------
@@ -37,11 +37,11 @@ class SoftTissue:
 def skin_motion(
     bones: Mapping[Segment, Floats], segment: Segment, tissue: SoftTissue
 ) -> tuple[Floats, Floats] | None:
-    """Rotation (n, 4) and shift (n, 3) in m of the skin in segment axes; None on a stiff segment.
+    """Rotation (n, 4) and shift (n, 3) in m of the skin in segment axes; None for a rigid segment.
 
     Parameters
     ----------
-    bones : segment → (n, 4) orientations of the pelvis and the leg, standing at first.
+    bones : segment → (n, 4) orientations of the pelvis and the leg, starting in standing.
     """
     side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
     if side is None:

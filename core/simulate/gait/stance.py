@@ -1,8 +1,8 @@
 """The foot on the floor: heel rocker after contact, flat and exactly still, rolling forefoot at push-off.
 
-A rigid foot that pivots about a point cannot push off as people do (the ankle stays 4 cm too low at 60 % of
-the cycle); the forefoot therefore rolls on a radius without slip
-(docs/science/simulation.md, "Contact foot").
+A rigid foot that pivots about a point cannot reproduce human push-off (the ankle stays 4 cm too low at 60 %
+of the cycle); the forefoot therefore rolls on a radius without slip (docs/science/simulation.md, "Contact
+foot").
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def foot_orientation(heading: Floats | float, pitch: Floats, roll: Floats | floa
 
 @dataclass(frozen=True, eq=False)
 class Sole:
-    """Points of the foot in its own frame, m (ankle centre = origin)."""
+    """Points of the foot in foot axes, m (ankle centre = origin)."""
 
     heel: Floats
     toe: Floats
@@ -62,7 +62,7 @@ class Sole:
 
 @dataclass(frozen=True, eq=False)
 class StanceFoot:
-    """Where one foot is while it touches the floor, and how that motion goes on beyond both ends."""
+    """Position of one foot during floor contact, with extrapolation past both ends."""
 
     walker: Walker
     side: Side
@@ -82,7 +82,7 @@ class StanceFoot:
         return wanted * self.walker.landing_amplitude(foot.step_m)
 
     def push_off_pitch(self, i: int, t: Floats) -> Floats:
-        """Pitch (n,) in rad on footprint i from heel-off on (0 before), continued beyond release."""
+        """Pitch (n,) in rad on footprint i from heel-off on (0 before), extrapolated past release."""
         heel_off, release = self.timing.heel_off[i], self.timing.release[i]
         phase_0 = self.walker.sides[self.side].heel_off
         u = (t - heel_off) / (release - heel_off)
@@ -101,7 +101,7 @@ class StanceFoot:
         return np.where(u > 0.0, push * rise * smoothstep(u / 0.45), 0.0)
 
     def on_heel(self, i: int, q: Floats) -> Floats:
-        """Ankle (n, 3) in m with the heel point held where footprint i has it."""
+        """Ankle (n, 3) in m with the heel point fixed at footprint i."""
         return self._floor_point(i, self.sole.heel) - rotate(q, self.sole.heel)
 
     def on_forefoot(self, i: int, q: Floats, pitch: Floats) -> Floats:
@@ -123,10 +123,11 @@ class StanceFoot:
         return self.on_heel(i, q) if self.landing_pitch(i) >= 0.0 else self.on_forefoot(i, q, pitch)
 
     def path(self, t: Floats) -> tuple[Floats, Floats, Floats]:
-        """Ankle (n, 3), pitch (n,) and heading (n,) over the whole take; only contact times are meant.
+        """Ankle (n, 3), pitch (n,) and heading (n,) over the whole recording; only contact times are
+        meaningful.
 
-        Each footprint fills the samples from the middle of the swing before to the middle of the swing after,
-        continued as if the foot still (or already) touched the floor.
+        Each footprint fills the samples from the middle of the previous swing to the middle of the next,
+        extrapolated as if the foot still (or already) touched the floor.
         """
         timing, n = self.timing, len(t)
         ankle, pitch, heading = np.empty((n, 3)), np.zeros(n), np.empty(n)
@@ -151,7 +152,7 @@ class StanceFoot:
         return ankle, pitch, heading
 
     def _floor_point(self, i: int, point: Floats) -> Floats:
-        """World position (3,) of a sole point while the foot lies flat on footprint i."""
+        """World position (3,) of a sole point with the foot flat on footprint i."""
         foot = self.prints[i]
         q = foot_orientation(foot.foot_rad, np.zeros(1))[0]
         return np.array([foot.x_m, foot.y_m, self.walker.anatomy.ankle_height]) + rotate(q, point)

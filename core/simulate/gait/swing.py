@@ -1,6 +1,6 @@
-"""The foot in the air: the leg follows the target angles, corrected onto the contact paths at both ends.
+"""The foot in swing: the leg follows the target angles, blended into the contact paths at both ends.
 
-Stance is given in world space, swing in joint space (docs/science/simulation.md, "Swing foot").
+Stance is defined in world space, swing in joint space (docs/science/simulation.md, "Swing foot").
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ MOST_LIFT = 0.095
 
 @dataclass(frozen=True, eq=False)
 class FootMotion:
-    """One foot over the take: ankle (n, 3) m; pitch, heading, roll (n,) rad; the lift of each swing, m."""
+    """One foot over the recording: ankle (n, 3) m; pitch, heading, roll (n,) rad; the lift of each swing,
+    m.
+    """
 
     ankle: Floats
     pitch: Floats
@@ -64,7 +66,7 @@ class FootMotion:
 def foot_motion(
     t: Floats, stance: StanceFoot, path: tuple[Floats, Floats, Floats], mid_hip: Floats, q_pelvis: Floats
 ) -> FootMotion:
-    """Put the swings between the contact paths, for a pelvis at `mid_hip` (n, 3), `q_pelvis` (n, 4)."""
+    """Insert the swings between the contact paths, for a pelvis at `mid_hip` (n, 3), `q_pelvis` (n, 4)."""
     ankle, pitch, heading = (a.copy() for a in path)
     roll = np.zeros(len(t))
     hip = mid_hip + rotate(q_pelvis, hip_offset(stance.walker, stance.side))
@@ -126,7 +128,7 @@ def _swing(
 def _free_leg(
     stance: StanceFoot, i: int, phase: Floats, scale: float, hip: Floats, q_pelvis: Floats
 ) -> tuple[Floats, Floats]:
-    """Ankle (n, 3) and shank axis (n, 3) in the world if the leg followed the target angles exactly."""
+    """Ankle (n, 3) and shank axis (n, 3) in W for a leg that follows the target angles exactly."""
     walker, side = stance.walker, stance.side
     landing, gait = stance.prints[i + 1], walker.sides[side]
     rest_knee = walker.standing_knee_rad
@@ -142,7 +144,7 @@ def _free_leg(
 
 
 def _within_reach(stance: StanceFoot, u: Floats, hip: Floats, ankle: Floats) -> Floats:
-    """Pull the free ankle towards the hip where the leg would be straighter than it may."""
+    """Move the free ankle towards the hip where the leg would be straighter than allowed."""
     walker = stance.walker
     limit = float(leg_reach(walker.anatomy, walker.sides[stance.side].knee_min_rad + DEGREE))
     along = ankle - hip
@@ -155,7 +157,7 @@ def _within_reach(stance: StanceFoot, u: Floats, hip: Floats, ankle: Floats) -> 
 def _needed_lift(
     stance: StanceFoot, u: Floats, hump: Floats, ankle: Floats, q: Floats, pitch: Floats
 ) -> float:
-    """Height in m of the hump that keeps the sole clear of the floor at mid-swing."""
+    """Height in m of the bump that keeps the sole clear of the floor at mid-swing."""
     walker = stance.walker
     wanted = walker.sides[stance.side].clearance_m * np.minimum(1.0, 3.0 * hump)
     need = wanted - stance.sole.lowest(ankle, q, pitch)

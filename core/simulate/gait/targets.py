@@ -1,7 +1,7 @@
-"""Target angles of one leg: the healthy curves with what this side does differently
-(docs/science/simulation.md, "Target curves").
+"""Target angles of one leg: the healthy curves with the deviations of this side (docs/science/simulation.md,
+"Target curves").
 
-Centres and widths of the humps are phases of the own cycle, 0 = initial contact.
+Centres and widths of the bumps are phases of the leg's own cycle, 0 = initial contact.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""When things happen in each leg's cycle, and the gait phase that reads the target curves."""
+"""Event times in each leg's cycle, and the gait phase at which the target curves are read."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class FootTiming:
 
     Parameters
     ----------
-    heel_off : the heel rises. opposite : the other foot's contact before, or the start of the first step.
-    release : end of contact. contact : next initial contact. flat : the foot is flat and still from here.
-    paused : standing lies between the two contacts.
+    heel_off : heel rise. opposite : previous contact of the other foot, or the start of the first step.
+        release : end of contact. contact : next initial contact. flat : start of the flat and still phase.
+        paused : there is standing between the two contacts.
     """
 
     heel_off: Floats
@@ -80,9 +80,9 @@ def size_window(plan: Plan, rate_hz: float, share: float) -> int:
 
 
 def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Floats:
-    """Unwrapped phase (n,) of one leg: whole numbers at its contacts.
+    """Unwrapped phase (n,) of one leg: integers at its contacts.
 
-    The other foot's contact is pinned to one half: without it slow or uneven gaits land with 20–29° knee
+    The other foot's contact is fixed at one half: without that, slow or uneven gaits land with 20–29° knee
     flexion instead of 4–9° (docs/science/simulation.md, "Timing").
     """
     if not len(timing.contact):
@@ -103,7 +103,7 @@ def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Flo
 
 
 def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
-    """Unwrapped phase (n,) of the pelvis curves: whole numbers at right contacts, halves at left ones."""
+    """Unwrapped phase (n,) of the pelvis curves: integers at right contacts, half-integers at left ones."""
     phase = 0.5 if plan.steps and plan.steps[0].side == "right" else 0.0
     knots = [(0.0, phase)]
     for step in plan.steps:
@@ -114,7 +114,7 @@ def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
 
 
 def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
-    """Factor (n,) on the pelvis and stance curves: 0 while standing, about 1 at the reference step length."""
+    """Factor (n,) on the pelvis and stance curves: 0 in standing, about 1 at the reference step length."""
     knots = [(0.0, 0.0)]
     for step in plan.steps:
         a = walker.amplitude(step.step_m)

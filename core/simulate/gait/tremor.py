@@ -3,7 +3,7 @@
 Like the shock of contact it is motion of the sensor, so acceleration, rate and pose belong together, and the
 segment itself does not notice: where the feet stand stays the exact truth. Size and rhythm are of the kind
 that is reported for freezing (3 to 8 Hz) and for Parkinsonian tremor (4 to 6 Hz), not measured ones
-(docs/science/simulation.md, "Trembling").
+(docs/science/simulation.md, "Impaired walks").
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What goes over the wire about accounts: signing in, passwords, second factors, tokens for programs."""
+"""Schemas of accounts: sign-in, passwords, second factors and API tokens."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Password = Annotated[str, StringConstraints(min_length=MIN_LENGTH, max_length=MA
 
 
 class SignInForm(Request):
-    """Name and password, and a code where the account has a second factor."""
+    """Name and password, and a code if the account has a second factor."""
 
     name: Annotated[str, StringConstraints(max_length=200)]
     password: Annotated[str, StringConstraints(max_length=1000)]
@@ -30,13 +30,13 @@ class SignInForm(Request):
 
 
 class SignIn(SignInForm):
-    """The same with what a security key answered in place of the code."""
+    """Credentials with the response of a security key instead of a code."""
 
     key: dict[str, Any] | None = Field(default=None, description="as PublicKeyCredential.toJSON gives it")
 
 
 class KeyQuestion(Request):
-    """Name and password, before a security key is asked for."""
+    """Name and password, submitted before a security key is requested."""
 
     name: Annotated[str, StringConstraints(max_length=200)]
     password: Annotated[str, StringConstraints(max_length=1000)]
@@ -44,13 +44,13 @@ class KeyQuestion(Request):
 
 @dataclass(frozen=True)
 class KeyOptions:
-    """What the browser needs of this server to ask a security key (WebAuthn, as JSON)."""
+    """Options with which the browser requests a security key (WebAuthn, as JSON)."""
 
     options: dict[str, Any]
 
 
 class KeyNew(Request):
-    """A new security key: its name, and what it answered."""
+    """A new security key: its name and registration response."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
     key: dict[str, Any]
@@ -58,7 +58,7 @@ class KeyNew(Request):
 
 @dataclass(frozen=True)
 class SecurityKey:
-    """A security key of one's own."""
+    """A security key of the signed-in user."""
 
     id: str
     name: str
@@ -76,14 +76,14 @@ class SetUp(Request):
 
 
 class PasswordChange(Request):
-    """One's own new password."""
+    """New password of the signed-in user."""
 
     current: Annotated[str, StringConstraints(max_length=1000)]
     password: Password
 
 
 class ApiTokenNew(Request):
-    """A token for a program: what for, for how many days, and one's password."""
+    """A new API token: scopes, lifetime in days, and the user's password."""
 
     name: Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=40)]
     scopes: Annotated[list[Scope], Field(min_length=1, max_length=len(Scope))]
@@ -92,7 +92,7 @@ class ApiTokenNew(Request):
 
 
 class PasswordProof(Request):
-    """One's password, for what a browser left open must not do."""
+    """The user's password, required for sensitive actions."""
 
     password: Annotated[str, StringConstraints(max_length=1000)]
 
@@ -104,17 +104,17 @@ class CodeProof(Request):
 
 
 class BothProofs(PasswordProof, CodeProof):
-    """One's password and a code: what changes by which keys one signs in."""
+    """Password and code, required to change security keys."""
 
 
 class KeysOnly(BothProofs):
-    """Whether security keys and recovery codes alone are taken."""
+    """Whether only security keys and recovery codes are accepted."""
 
     on: bool
 
 
 class LanguageChoice(Request):
-    """In which language one reads the pages."""
+    """Language of the pages."""
 
     language: Literal["en", "de"] | None
 
@@ -133,7 +133,7 @@ class User:
 
 @dataclass(frozen=True)
 class Account:
-    """Who is signed in, and what this person may do."""
+    """The signed-in user and the permitted actions."""
 
     id: str
     name: str
@@ -144,7 +144,7 @@ class Account:
 
 @dataclass(frozen=True)
 class SignInState:
-    """Who is signed in, and seconds until that ends if nobody does anything."""
+    """The signed-in user, and seconds until the sign-in expires without activity."""
 
     name: str
     left_s: float
@@ -160,7 +160,7 @@ class UserNew(Request):
 
 
 class UserChange(Request):
-    """What to change of an account; members left out stay as they are."""
+    """Changes to an account; omitted fields are unchanged."""
 
     display_name: Line = ""
     role: Role = Role.VIEWER
@@ -170,7 +170,7 @@ class UserChange(Request):
 
 @dataclass(frozen=True)
 class ApiToken:
-    """A token for a program, without the token itself."""
+    """An API token, without the secret."""
 
     id: str
     name: str
@@ -182,13 +182,13 @@ class ApiToken:
 
 @dataclass(frozen=True)
 class NewApiToken(ApiToken):
-    """A token that has just been made; it is shown this once."""
+    """A newly created token, shown only once."""
 
     token: str
 
 
 @dataclass(frozen=True)
 class RecoveryCodes:
-    """Codes for when the telephone is lost, one a line; shown this once, each works once."""
+    """Single-use codes in case the phone is lost, shown only once."""
 
     codes: str

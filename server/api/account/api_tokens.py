@@ -1,4 +1,4 @@
-"""One's own tokens for programs."""
+"""API tokens of the signed-in user."""
 
 from __future__ import annotations
 
@@ -23,27 +23,27 @@ Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 
 @router.get("", response_model=list[ApiToken])
-def list_tokens(db: Db, who: Self) -> list[ApiToken]:
-    """One's own tokens, the newest first; what they are is not told again."""
+def list_tokens(db: Db, user: Self) -> list[ApiToken]:
+    """List API tokens of the signed-in user, newest first, without their secrets."""
     with db.read() as c:
-        return [make_answer(ApiToken, row) for row in api_tokens.list_tokens(c, who.user_id)]
+        return [make_answer(ApiToken, row) for row in api_tokens.list_tokens(c, user.user_id)]
 
 
 @router.post("", status_code=201, response_model=NewApiToken, responses=refusals(409, 429))
 def make_token(body: ApiTokenNew, db: Db, proof: Proving) -> NewApiToken:
-    """Make a token; the answer is the only one that shows it. Asks for one's password."""
+    """Create an API token; requires the password. The token is shown only in this response."""
     proof.check_password(body.password)
-    who = proof.who
+    user = proof.who
     with db.write() as c:
-        row, token = api_tokens.issue(c, who.user_id, body.name, set(body.scopes), body.days)
+        row, token = api_tokens.issue(c, user.user_id, body.name, set(body.scopes), body.days)
         detail = {"scopes": row.scopes, "days": body.days}
-        audit.record(c, who, "token.made", "api_token", row.id, detail)
+        audit.record(c, user, "token.made", "api_token", row.id, detail)
     return make_answer(NewApiToken, row, token=token)
 
 
 @router.delete("/{token_id}", status_code=204, responses=refusals(404))
-def revoke_token(token_id: Id, db: Db, who: Self) -> None:
-    """End a token at once."""
+def revoke_token(token_id: Id, db: Db, user: Self) -> None:
+    """Revoke a token immediately."""
     with db.write() as c:
-        api_tokens.revoke(c, who.user_id, token_id)
-        audit.record(c, who, "token.revoked", "api_token", token_id)
+        api_tokens.revoke(c, user.user_id, token_id)
+        audit.record(c, user, "token.revoked", "api_token", token_id)

@@ -1,4 +1,4 @@
-"""The password once more, and a code: asked of who is signed in before keys and tokens change."""
+"""Re-authentication by password and code before security keys or tokens are changed."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from sagittal.server.trail import AuditTrail
 
 @dataclass(frozen=True)
 class Proof:
-    """Who must prove it, and what the proof is checked and counted with."""
+    """Verifies the credentials of the signed-in user and counts failures."""
 
     who: Identity
     address: str
@@ -34,7 +34,7 @@ class Proof:
     failures: Throttle
 
     def check_password(self, password: str) -> None:
-        """Raise Problem 403 for a wrong one, 429 after too many."""
+        """Raise Problem 403 for a wrong password, 429 after too many."""
         # 403, not 401: the person is signed in and must not be sent to the sign-in page
         accounts.check_password(
             self.db, self.failures, self.trail, self.who.name, password, self.address, status=403
@@ -42,22 +42,22 @@ class Proof:
 
     @contextmanager
     def write(self, password: str, code: str) -> Iterator[Connection]:
-        """Check both, a code where one is asked for, and open a transaction for what they allow."""
+        """Verify the password, and a code if required, and open a transaction for the change."""
         self.check_password(password)
         with accounts.count_wrong_codes(self.failures, self.who.user_id), self.db.write() as c:
             self._require_code(c, code)
             yield c
 
     def _require_code(self, c: Connection, code: str) -> None:
-        """After the password: a code, which a browser left open does not have. Raises CodeWrong 403."""
+        """Verify the second factor after the password. Raises CodeWrong 403."""
         user_id = self.who.user_id
         if not second_factor.is_on(c, user_id):
             return  # nor has the account a key
-        before = second_factor.count_recovery(c, user_id)
+        remaining = second_factor.count_recovery(c, user_id)
         if not second_factor.use(c, self.settings.second_factor_key, user_id, code):
             raise second_factor.CodeWrong(403)
         left = second_factor.count_recovery(c, user_id)
-        if left < before:
+        if left < remaining:
             audit.record(c, self.who, "user.recovery_code_used", "user", user_id, {"left": left})
 
 
@@ -67,9 +67,9 @@ async def _proof(
     settings: Config,
     trail: OpenTrail,
     failures: Failures,
-    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+    user: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> Proof:
-    return Proof(who, address_of(request), db, settings, trail, failures)
+    return Proof(user, address_of(request), db, settings, trail, failures)
 
 
 Proving = Annotated[Proof, Depends(_proof)]

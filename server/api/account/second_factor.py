@@ -1,4 +1,4 @@
-"""One's own second factor: set up, proved by a code, removed."""
+"""Second factor of the signed-in user: set up, confirm, remove."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 def set_up(
     body: account_schemas.PasswordProof, db: Db, settings: Config, proof: Proving
 ) -> second_factor.SecondFactorSetUp:
-    """Make a secret for an authenticator; it is asked for once a code has proved it (`confirm`)."""
+    """Create a secret for an authenticator; it takes effect once confirmed by a code (`confirm`)."""
     proof.check_password(body.password)
     with db.write() as c:
         return second_factor.begin(c, settings.second_factor_key, proof.who.user_id, proof.who.name)
@@ -33,20 +33,20 @@ def set_up(
 
 @router.post("/confirm", response_model=account_schemas.RecoveryCodes, responses=refusals(429))
 def confirm(
-    body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self
+    body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, user: Self
 ) -> account_schemas.RecoveryCodes:
-    """Ask for codes from now on; the answer has the recovery codes, this once."""
-    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
-        codes = second_factor.confirm(c, settings.second_factor_key, who.user_id, body.code)
-        audit.record(c, who, "user.second_factor_on", "user", who.user_id)
+    """Activate the second factor; the response contains the recovery codes, shown only once."""
+    with accounts.count_wrong_codes(failures, user.user_id), db.write() as c:
+        codes = second_factor.confirm(c, settings.second_factor_key, user.user_id, body.code)
+        audit.record(c, user, "user.second_factor_on", "user", user.user_id)
     return account_schemas.RecoveryCodes("\n".join(codes))
 
 
 @router.post("/remove", status_code=204, responses=refusals(429))
-def remove(body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, who: Self) -> None:
-    """Ask for no code any more; needs one, or a recovery code."""
-    with accounts.count_wrong_codes(failures, who.user_id), db.write() as c:
-        if not second_factor.use(c, settings.second_factor_key, who.user_id, body.code):
+def remove(body: account_schemas.CodeProof, db: Db, settings: Config, failures: Failures, user: Self) -> None:
+    """Deactivate the second factor; requires a code or a recovery code."""
+    with accounts.count_wrong_codes(failures, user.user_id), db.write() as c:
+        if not second_factor.use(c, settings.second_factor_key, user.user_id, body.code):
             raise second_factor.CodeWrong(403)
-        second_factor.remove(c, who.user_id)
-        audit.record(c, who, "user.second_factor_off", "user", who.user_id)
+        second_factor.remove(c, user.user_id)
+        audit.record(c, user, "user.second_factor_off", "user", user.user_id)

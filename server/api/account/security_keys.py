@@ -1,4 +1,4 @@
-"""One's own security keys: set up, listed, removed, and whether they alone are taken."""
+"""Security keys of the signed-in user: register, list, remove, and require them for sign-in."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ Self = Annotated[Identity, require(Action.USE_ACCOUNT)]
 
 
 @router.get("/security-keys", response_model=list[account_schemas.SecurityKey])
-def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
-    """One's own keys, the oldest first."""
+def list_keys(db: Db, user: Self) -> list[account_schemas.SecurityKey]:
+    """List security keys of the signed-in user, oldest first."""
     with db.read() as c:
-        rows = security_keys.list_keys(c, who.user_id)
+        rows = security_keys.list_keys(c, user.user_id)
     return [schemas.make_answer(account_schemas.SecurityKey, row) for row in rows]
 
 
@@ -38,10 +38,10 @@ def list_keys(db: Db, who: Self) -> list[account_schemas.SecurityKey]:
 def begin(
     body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> account_schemas.KeyOptions:
-    """What the browser needs to set up a key; it is answered within five minutes."""
-    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    """Options for registering a security key; the browser must respond within five minutes."""
+    site, user = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
-        return account_schemas.KeyOptions(security_keys.begin_registration(c, site, who.user_id, who.name))
+        return account_schemas.KeyOptions(security_keys.begin_registration(c, site, user.user_id, user.name))
 
 
 @router.post(
@@ -51,18 +51,18 @@ def begin(
     responses=refusals(403, 409),
 )
 def add(
-    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, trail: OpenTrail, who: Self
+    body: account_schemas.KeyNew, request: Request, db: Db, settings: Config, trail: OpenTrail, user: Self
 ) -> account_schemas.SecurityKey:
-    """Keep a key by what it answered."""
+    """Register a security key from its response."""
     site = site_of(request, behind_tls=settings.behind_tls)
     with db.write() as c:  # of its own: a refusal must not give the challenge back
-        challenge = security_keys.take_challenge(c, who.user_id, "register", body.key)
+        challenge = security_keys.take_challenge(c, user.user_id, "register", body.key)
     try:
         with db.write() as c:
-            row = security_keys.register(c, site, who.user_id, body.name, body.key, challenge)
-            audit.record(c, who, "user.security_key_added", "user", who.user_id, {"key": row.id})
+            row = security_keys.register(c, site, user.user_id, body.name, body.key, challenge)
+            audit.record(c, user, "user.security_key_added", "user", user.user_id, {"key": row.id})
     except security_keys.KeyRefused:
-        trail.record_opened(who, "user.security_key_refused", "user", who.user_id)
+        trail.record_opened(user, "user.security_key_refused", "user", user.user_id)
         raise
     return schemas.make_answer(account_schemas.SecurityKey, row)
 
@@ -71,21 +71,21 @@ def add(
 def remove(
     key_id: Id, body: account_schemas.BothProofs, request: Request, settings: Config, proof: Proving
 ) -> None:
-    """Forget a key; with the last one of this address the figures of the authenticator are taken again."""
-    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    """Remove a security key; with the last one of this address, authenticator codes are accepted again."""
+    site, user = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
-        security_keys.remove(c, site, who.user_id, key_id)
-        audit.record(c, who, "user.security_key_removed", "user", who.user_id, {"key": key_id})
+        security_keys.remove(c, site, user.user_id, key_id)
+        audit.record(c, user, "user.security_key_removed", "user", user.user_id, {"key": key_id})
 
 
 @router.put("/second-factor/keys-only", status_code=204, responses=refusals(409, 429))
 def choose_keys_only(
     body: account_schemas.KeysOnly, request: Request, settings: Config, proof: Proving
 ) -> None:
-    """Take security keys and recovery codes only, or the figures of the authenticator as well."""
-    site, who = site_of(request, behind_tls=settings.behind_tls), proof.who
+    """Accept security keys and recovery codes only, or authenticator codes as well."""
+    site, user = site_of(request, behind_tls=settings.behind_tls), proof.who
     with proof.write(body.password, body.code) as c:
-        if body.on and not security_keys.list_usable(c, site, who.user_id):
+        if body.on and not security_keys.list_usable(c, site, user.user_id):
             raise Problem(409, "no_key", "Set up a security key for this address first.")
-        second_factor.take_keys_only(c, who.user_id, body.on)
-        audit.record(c, who, "user.keys_only" if body.on else "user.codes_again", "user", who.user_id)
+        second_factor.take_keys_only(c, user.user_id, body.on)
+        audit.record(c, user, "user.keys_only" if body.on else "user.codes_again", "user", user.user_id)

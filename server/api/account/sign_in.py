@@ -1,4 +1,4 @@
-"""Sign in and out, the first administrator, one's own account."""
+"""Sign-in and sign-out, set-up of the first administrator, and the user's own account."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ async def _credentials(request: Request) -> account_schemas.SignIn:
             return account_schemas.SignIn(**form.model_dump())
         return account_schemas.SignIn.model_validate(await request.json())
     except json.JSONDecodeError as error:
-        told = {"type": "json_invalid", "loc": ("body", error.pos), "msg": error.msg}
-        raise RequestValidationError([told]) from None
+        detail = {"type": "json_invalid", "loc": ("body", error.pos), "msg": error.msg}
+        raise RequestValidationError([detail]) from None
     except ValidationError as error:
         items = [{**item, "loc": ("body", *item["loc"])} for item in error.errors()]
         raise RequestValidationError(items) from error
@@ -82,7 +82,7 @@ def sign_in(
     trail: OpenTrail,
     failures: Failures,
 ) -> Any:
-    """Sign in with name and password, and a code where it is needed; the answer sets the session cookie."""
+    """Sign in with name, password and, if required, a code; the response sets the session cookie."""
     address = address_of(request)
     row = accounts.check_password(db, failures, trail, body.name, body.password, address)
     key = settings.second_factor_key
@@ -95,10 +95,10 @@ def sign_in(
                 audit.record(c, None, "user.recovery_code_used", "user", row.id, left)
             token = _open(c, logins, row, request, "sign_in", {"factor": factor.value})
     except OperationalError as error:
-        kept = logins.keep(row.id, read_token(request)) if refusal_of(error) else None
-        if kept is None:
+        session = logins.keep(row.id, read_token(request)) if refusal_of(error) else None
+        if session is None:
             raise
-        token = kept
+        token = session
         trail.record_opened(_identity(row, token), "sign_in", "user", row.id, {"factor": factor.value})
     response: Response
     if request.headers.get("content-type", "").startswith(_FORM):
@@ -124,7 +124,9 @@ def ask_for_key(
     trail: OpenTrail,
     failures: Failures,
 ) -> account_schemas.KeyOptions:
-    """After the right name and password: what the browser needs to ask a key; 404 without one for here."""
+    """Options for signing in with a security key, after the correct password; 404 if none is
+    registered here.
+    """
     row = accounts.check_password(db, failures, trail, body.name, body.password, address_of(request))
     with db.write() as c:
         options = begin_sign_in(c, site_of(request, behind_tls=settings.behind_tls), row.id)
@@ -138,11 +140,11 @@ def sign_out(
     request: Request,
     logins: OpenLogins,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.USE_ACCOUNT)],
+    user: Annotated[Identity, require(Action.USE_ACCOUNT)],
 ) -> Response:
     """End this sign-in."""
-    logins.close(who.login_id)
-    trail.record_opened(who, "sign_out", "user", who.user_id)
+    logins.close(user.login_id)
+    trail.record_opened(user, "sign_out", "user", user.user_id)
     response = Response(status_code=204)
     clear_token(response, request)
     return response
@@ -159,7 +161,7 @@ def sign_out(
 def set_up(
     token: str, body: account_schemas.SetUp, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail
 ) -> Any:
-    """Make the first administrator with the token of the printed address, and sign in."""
+    """Create the first administrator with the token of the printed link, and sign in."""
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
     # the hash takes long: outside of the transaction, and not for everybody who guesses
@@ -176,21 +178,21 @@ def set_up(
 
 @router.get("/sign-in", response_model=account_schemas.SignInState)
 def read_sign_in(
-    logins: OpenLogins, who: Annotated[Identity, require(Action.WATCH_SIGN_IN)]
+    logins: OpenLogins, user: Annotated[Identity, require(Action.WATCH_SIGN_IN)]
 ) -> account_schemas.SignInState:
-    """Tell how long this sign-in still lasts; asking does not prolong it."""
-    return account_schemas.SignInState(name=who.name, left_s=round(logins.seconds_left(who.login_id), 1))
+    """Remaining time of this sign-in; the request does not prolong it."""
+    return account_schemas.SignInState(name=user.name, left_s=round(logins.seconds_left(user.login_id), 1))
 
 
 @router.get("/account", response_model=account_schemas.Account)
-def read_account(who: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> account_schemas.Account:
-    """Tell who is signed in and what this person may do."""
+def read_account(user: Annotated[Identity, require(Action.USE_ACCOUNT)]) -> account_schemas.Account:
+    """The signed-in user and the permitted actions."""
     return account_schemas.Account(
-        id=who.user_id,
-        name=who.name,
-        display_name=who.display_name,
-        role=who.role,
-        actions=sorted(action for action in POLICY if who.may(action)),
+        id=user.user_id,
+        name=user.name,
+        display_name=user.display_name,
+        role=user.role,
+        actions=sorted(action for action in POLICY if user.may(action)),
     )
 
 
@@ -201,29 +203,29 @@ def change_password(
     logins: OpenLogins,
     proof: Proving,
 ) -> None:
-    """Change one's own password; all other sign-ins of this person end."""
+    """Change the user's password; all other sign-ins of the user end."""
     proof.check_password(body.current)
-    who = proof.who
+    user = proof.who
     hashed = hash_password(body.password)
     with db.write() as c:
-        accounts.change(c, who.user_id, {"password_hash": hashed})
-        logins.end_all(c, who.user_id, but=who.login_id)
-        audit.record(c, who, "user.password_changed", "user", who.user_id)
+        accounts.change(c, user.user_id, {"password_hash": hashed})
+        logins.end_all(c, user.user_id, but=user.login_id)
+        audit.record(c, user, "user.password_changed", "user", user.user_id)
 
 
 @router.put("/account/language", status_code=204)
 def choose_language(
-    body: account_schemas.LanguageChoice, db: Db, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+    body: account_schemas.LanguageChoice, db: Db, user: Annotated[Identity, require(Action.USE_ACCOUNT)]
 ) -> None:
-    """Choose the language of the pages; null = the one the browser asks for."""
+    """Set the language of the pages; null = as requested by the browser."""
     with db.write() as c:
-        accounts.change(c, who.user_id, {"language": body.language})
-        audit.record(c, who, "user.language_chosen", "user", who.user_id, {"language": body.language})
+        accounts.change(c, user.user_id, {"language": body.language})
+        audit.record(c, user, "user.language_chosen", "user", user.user_id, {"language": body.language})
 
 
 @address_router.get("/sign-in/{token}", dependencies=[require(Action.SIGN_IN)])
 def sign_in_once(token: str, request: Request, db: Db, logins: OpenLogins, trail: OpenTrail) -> Response:
-    """Sign in with a printed one-time address and go to the patients."""
+    """Sign in with a printed one-time link and go to the patient list."""
     with _told(trail, request), db.write() as c:
         user_id = one_time.use(c, token, "sign_in")
         row = accounts.get(c, user_id or "")
@@ -247,7 +249,7 @@ def _identity(row: Row[Any], token: str) -> Identity:
 
 @contextlib.contextmanager
 def _told(trail: AuditTrail, request: Request) -> Iterator[None]:
-    """Write down a one-time address that was not valid."""
+    """Record the use of an invalid one-time link."""
     try:
         yield
     except one_time.LinkNotValid:

@@ -1,4 +1,4 @@
-"""Accounts, for administrators."""
+"""User accounts, for administrators."""
 
 from __future__ import annotations
 
@@ -26,60 +26,60 @@ Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 
 
 @router.get("", response_model=list[account_schemas.User])
-def list_users(db: Db, who: Admin) -> list[account_schemas.User]:
-    """All accounts in order of their names."""
+def list_users(db: Db, user: Admin) -> list[account_schemas.User]:
+    """List all accounts by name."""
     with db.read() as c:
         return [user_answer(row) for row in accounts.list_accounts(c)]
 
 
 @router.post("", status_code=201, response_model=account_schemas.User, responses=refusals(409))
-def add_user(body: account_schemas.UserNew, db: Db, who: Admin) -> account_schemas.User:
-    """Add an account with its first password."""
+def add_user(body: account_schemas.UserNew, db: Db, user: Admin) -> account_schemas.User:
+    """Add an account with an initial password."""
     hashed = hash_password(body.password)
     with db.write() as c:
         row = accounts.create(c, body.name, body.display_name, body.role, hashed)
-        audit.record(c, who, "user.created", "user", row.id, {"role": row.role})
+        audit.record(c, user, "user.created", "user", row.id, {"role": row.role})
     return user_answer(row)
 
 
 @router.patch("/{user_id}", response_model=account_schemas.User, responses=refusals(409))
 def change_user(
-    user_id: Id, body: account_schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, who: Admin
+    user_id: Id, body: account_schemas.UserChange, db: Db, logins: OpenLogins, failures: Failures, user: Admin
 ) -> account_schemas.User:
-    """Change role, shown name, password, or close the account.
+    """Change role, display name or password, or close the account.
 
-    Sign-ins end, by a new password tokens too. Links to reports end with the account of their maker, and when
-    the maker may no longer open the patient.
+    Ends the user's sign-ins; a new password also revokes API tokens. Report links end if their creator's
+    account is closed or may no longer open the patient.
     """
     values = body.model_dump(exclude_unset=True, mode="json")
     fields = sorted(values)
     if "password" in values:
         values["password_hash"] = hash_password(values.pop("password"))
     with db.write() as c:
-        before = accounts.get(c, user_id)
+        previous = accounts.get(c, user_id)
         row = accounts.change(c, user_id, values)
-        if "password_hash" in values or (row.role, row.active) != (before.role, before.active):
-            logins.end_all(c, user_id, but=who.login_id)
+        if "password_hash" in values or (row.role, row.active) != (previous.role, previous.active):
+            logins.end_all(c, user_id, but=user.login_id)
         if "password_hash" in values:
             api_tokens.revoke_all(c, user_id)
-        audit.record(c, who, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
-        report_links.end_orphaned(c, who)
+        audit.record(c, user, "user.changed", "user", user_id, {"fields": fields, "role": row.role})
+        report_links.end_orphaned(c, user)
     if "password_hash" in values:
         failures.forgive(row.name)
     return user_answer(row)
 
 
 @router.delete("/{user_id}/second-factor", status_code=204, responses=refusals(404))
-def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, who: Admin) -> None:
-    """Remove somebody's second factor, whose telephone is lost; that person's sign-ins end."""
+def reset_second_factor(user_id: Id, db: Db, logins: OpenLogins, user: Admin) -> None:
+    """Remove a user's second factor, for example after losing the phone; the user's sign-ins end."""
     with db.write() as c:
         accounts.get(c, user_id)
         if not second_factor.remove(c, user_id):
             raise Problem(404, "second_factor_off", "This account has no second factor.")
-        logins.end_all(c, user_id, but=who.login_id)
-        audit.record(c, who, "user.second_factor_reset", "user", user_id)
+        logins.end_all(c, user_id, but=user.login_id)
+        audit.record(c, user, "user.second_factor_reset", "user", user_id)
 
 
 def user_answer(row: Row[Any]) -> account_schemas.User:
-    """Return an account as it is answered: of its row everything but the password."""
+    """Convert a row to a response without the password."""
     return schemas.make_answer(account_schemas.User, row, role=Role(row.role))

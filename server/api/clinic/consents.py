@@ -1,4 +1,4 @@
-"""What a patient has agreed to."""
+"""Consents of patients."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
 
 @router.get("/patients/{patient_id}/consents", response_model=list[consents.Consent])
 def list_consents(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> list[consents.Consent]:
-    """What a patient agreed to, what holds first."""
+    """List consents of a patient, those in force first."""
     with db.read() as c:
         patients.get(c, patient_id)
-        found = consents.of_patient(c, patient_id)
-    trail.record_opened(who, "consents.opened", "patient", patient_id)
-    return found
+        rows = consents.of_patient(c, patient_id)
+    trail.record_opened(user, "consents.opened", "patient", patient_id)
+    return rows
 
 
 @router.post(
@@ -37,14 +37,14 @@ def list_consents(
     response_model=consents.Consent,
     responses=refusals(409),
 )
-def give_consent(patient_id: Id, body: schemas.ConsentNew, db: Db, who: Writer) -> consents.Consent:
-    """Write down that a patient agreed."""
+def give_consent(patient_id: Id, body: schemas.ConsentNew, db: Db, user: Writer) -> consents.Consent:
+    """Record a patient's consent."""
     with db.write() as c:
-        return consents.give(c, who, patient_id, **body.values())
+        return consents.give(c, user, patient_id, **body.values())
 
 
 @router.post("/consents/{consent_id}/withdraw", response_model=consents.Consent, responses=refusals(409))
-def withdraw_consent(consent_id: Id, db: Db, who: Writer) -> consents.Consent:
-    """Write down that a patient no longer agrees, from today; the row stays."""
+def withdraw_consent(consent_id: Id, db: Db, user: Writer) -> consents.Consent:
+    """Record the withdrawal of a consent as of today; the consent remains on record."""
     with db.write() as c:
-        return consents.withdraw(c, who, consent_id)
+        return consents.withdraw(c, user, consent_id)

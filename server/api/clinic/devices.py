@@ -1,4 +1,4 @@
-"""The clinic's sensors by serial number, without a word of who wore them; what is not defined is null."""
+"""The clinic's sensors by serial number, without patient data; undefined values are null."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class DeviceCheckAnswer:
-    """What one take showed of a sensor, in its own axes, or why nothing.
+    """Check of a sensor in one trial, in sensor axes, or the reason why there is none.
 
-    `rest_s`: the window, from the sensor's first sample. `bias_error`: what the wearer may have turned at.
-    `up`: the vertical. `rthz`: per √Hz.
+    `rest_s`: still period, from the sensor's first sample. `bias_error`: uncertainty due to slow rotation of
+    the wearer. `up`: the vertical. `rthz`: per √Hz.
     """
 
     day: dt.date
@@ -61,7 +61,7 @@ class DeviceCheckAnswer:
 
 @dataclass(frozen=True)
 class DeviceAnswer:
-    """A sensor: where it was worn last, what is said of it and why, its newest checks, oldest first."""
+    """A sensor: last placement, assessment with reasons, and latest checks, oldest first."""
 
     device_id: str
     last_worn_on: dt.date
@@ -74,8 +74,8 @@ class DeviceAnswer:
 
 
 @router.get("/devices", response_model=list[DeviceAnswer])
-def list_devices(db: Db, who: Reader) -> list[DeviceAnswer]:
-    """Sensors of the clinic with their newest checks, the one that was worn last first."""
+def list_devices(db: Db, user: Reader) -> list[DeviceAnswer]:
+    """List sensors of the clinic with their latest checks, most recently used first."""
     with db.read() as c:
         return [_answer(d) for d in devices.list_devices(c)]
 
@@ -85,15 +85,15 @@ def list_devices(db: Db, who: Reader) -> list[DeviceAnswer]:
     response_class=Response,
     responses={200: {"description": "The table", "content": {"text/csv": {"schema": BINARY}}}},
 )
-def read_checks_table(db: Db, who: Reader) -> Response:
-    """The same as a table: one row per sensor and take."""
+def read_checks_table(db: Db, user: Reader) -> Response:
+    """Device checks as a table: one row per sensor and trial."""
     with db.read() as c:
-        known = devices.list_devices(c)
-    return attachment(write_csv(COLUMNS, _rows(known)), "sensors.csv")
+        sensors = devices.list_devices(c)
+    return attachment(write_csv(COLUMNS, _rows(sensors)), "sensors.csv")
 
 
 @router.get("/devices/{device_id}", response_model=DeviceAnswer)
-def read_device(device_id: DeviceId, db: Db, who: Reader) -> DeviceAnswer:
+def read_device(device_id: DeviceId, db: Db, user: Reader) -> DeviceAnswer:
     """One sensor."""
     with db.read() as c:
         return _answer(devices.get(c, device_id))
@@ -131,8 +131,8 @@ def _check(x: DatedCheck) -> DeviceCheckAnswer:
     )
 
 
-def _rows(known: Sequence[KnownDevice]) -> Iterator[Sequence[object]]:
-    for d in known:
+def _rows(sensors: Sequence[KnownDevice]) -> Iterator[Sequence[object]]:
+    for d in sensors:
         for k in map(_check, d.checks):
             yield (
                 d.device_id, k.day.isoformat(), k.segment, k.rate_hz, *(k.rest_s or (None, None)),

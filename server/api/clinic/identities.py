@@ -1,4 +1,4 @@
-"""Who a patient is, beside the pseudonym."""
+"""Identities of patients, stored in addition to the pseudonym."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def read_identity(
     db: Db,
     settings: Config,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_IDENTITY)],
+    user: Annotated[Identity, require(Action.READ_IDENTITY)],
 ) -> PatientIdentity:
-    """Name, date of birth, numbers and contact of a patient; null = not written down. No token reads this."""
+    """Name, date of birth, numbers and contact of a patient; null = not recorded. Not available to tokens."""
     with db.read() as c:
-        found = identities.get(c, settings.identity_key_file, patient_id)
-    trail.record_opened(who, "identity.opened", "patient", patient_id)
-    return found
+        identity = identities.get(c, settings.identity_key_file, patient_id)
+    trail.record_opened(user, "identity.opened", "patient", patient_id)
+    return identity
 
 
 @router.patch("/patients/{patient_id}/identity", response_model=PatientIdentity, responses=refusals(409))
@@ -40,8 +40,8 @@ def change_identity(
     body: schemas.IdentityChange,
     db: Db,
     settings: Config,
-    who: Annotated[Identity, require(Action.WRITE_IDENTITY)],
+    user: Annotated[Identity, require(Action.WRITE_IDENTITY)],
 ) -> PatientIdentity:
-    """Write down who a patient is; members left out stay as they are, null takes one away."""
+    """Update the identity of a patient; omitted fields are unchanged, null clears a value."""
     with db.write() as c:
-        return identities.change(c, settings.identity_key_file, who, patient_id, body.values())
+        return identities.change(c, settings.identity_key_file, user, patient_id, body.values())

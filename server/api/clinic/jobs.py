@@ -1,4 +1,4 @@
-"""Jobs: what the workers do, pushed while it happens."""
+"""Jobs of the workers, with live updates."""
 
 from __future__ import annotations
 
@@ -35,24 +35,24 @@ _JOB = TypeAdapter(JobView)
 def list_jobs(
     db: Db,
     trail: OpenTrail,
-    who: Reader,
+    user: Reader,
     active: Annotated[bool, Query(description="only queued and running ones")] = False,
     limit: Annotated[int, Query(ge=1, le=1000)] = 100,
 ) -> list[jobs.ListedJob]:
-    """Jobs, the newest first."""
+    """List jobs, newest first."""
     with db.read() as c:
-        rows = jobs.list_jobs(c, who, active_only=active, limit=limit)
-    trail.record_watched(who, "job.listed", "job", None)
+        rows = jobs.list_jobs(c, user, active_only=active, limit=limit)
+    trail.record_watched(user, "job.listed", "job", None)
     return rows
 
 
 @router.get("/{job_id}", response_model=jobs.ListedJob)
-def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJob:
-    """One job: its progress, or why it failed."""
+def read_job(job_id: Id, db: Db, trail: OpenTrail, user: Reader) -> jobs.ListedJob:
+    """Progress of a job, or the reason of its failure."""
     with db.read() as c:
-        found = jobs.get(c, job_id)
-    trail.record_watched(who, "job.opened", "job", job_id)
-    return found
+        row = jobs.get(c, job_id)
+    trail.record_watched(user, "job.opened", "job", job_id)
+    return row
 
 
 @router.get(
@@ -63,9 +63,9 @@ def read_job(job_id: Id, db: Db, trail: OpenTrail, who: Reader) -> jobs.ListedJo
     },
 )
 async def watch_job(
-    job_id: Id, request: Request, db: Db, feed: context.Feed, who: Reader
+    job_id: Id, request: Request, db: Db, feed: context.Feed, user: Reader
 ) -> StreamingResponse:
-    """Push the job as server-sent events, each one a Job as JSON; the stream ends with the job."""
+    """Stream a job as server-sent events, each a Job as JSON; the stream ends with the job."""
 
     def check() -> None:
         with db.read() as c:
@@ -81,20 +81,20 @@ def cancel_job(
     job_id: Id,
     db: Db,
     queue: context.Queue,
-    who: Annotated[Identity, require(Action.CANCEL_JOB)],
+    user: Annotated[Identity, require(Action.CANCEL_JOB)],
 ) -> JobView:
-    """Ask a job to stop, which it does within two seconds; a finished one stays as it is."""
+    """Request cancellation of a job, which takes effect within two seconds; no effect if finished."""
     with db.write() as c:
-        return jobs.cancel(c, queue, who, job_id)
+        return jobs.cancel(c, queue, user, job_id)
 
 
 async def _events(feed: JobFeed, job_id: str, find_end: Callable[[], str | None]) -> AsyncIterator[str]:
-    """Format the changes of a job as events, with a comment in between so that proxies keep the line open.
+    """Format updates of a job as events, with comments in between so that proxies keep the connection open.
 
     Parameters
     ----------
-    find_end : why the stream must end, None while it may go on; however often the job changes, it is called
-        every `CHECK_EVERY_S`.
+    find_end : returns why the stream must end, None to continue; called every `CHECK_EVERY_S` regardless of
+        updates.
     """
     watch = cast("AsyncGenerator[JobView, None]", feed.watch(job_id))
     async with contextlib.aclosing(watch) as views:

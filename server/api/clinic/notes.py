@@ -20,25 +20,25 @@ Writer = Annotated[Identity, require(Action.WRITE_PATIENT)]
 
 @router.get("/patients/{patient_id}/notes", response_model=list[notes.PatientNote])
 def list_notes(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> list[notes.PatientNote]:
-    """The notes about a patient, of the latest day first."""
+    """List notes about a patient, latest date first."""
     with db.read() as c:
         patients.get(c, patient_id)
-        found = notes.of_patient(c, patient_id)
-    trail.record_opened(who, "notes.opened", "patient", patient_id)
-    return found
+        rows = notes.of_patient(c, patient_id)
+    trail.record_opened(user, "notes.opened", "patient", patient_id)
+    return rows
 
 
 @router.post("/patients/{patient_id}/notes", status_code=201, response_model=notes.PatientNote)
-def add_note(patient_id: Id, body: schemas.NoteNew, db: Db, who: Writer) -> notes.PatientNote:
+def add_note(patient_id: Id, body: schemas.NoteNew, db: Db, user: Writer) -> notes.PatientNote:
     """Add a note about a patient."""
     with db.write() as c:
-        return notes.add(c, who, patient_id, **body.values())
+        return notes.add(c, user, patient_id, **body.values())
 
 
 @router.delete("/notes/{note_id}", status_code=204)
-def remove_note(note_id: Id, db: Db, who: Writer) -> None:
-    """Remove a note for good, one's own or as an administrator; the audit log keeps that there was one."""
+def remove_note(note_id: Id, db: Db, user: Writer) -> None:
+    """Delete a note, one's own or, as an administrator, any; the audit log records the deletion."""
     with db.write() as c:
-        notes.remove(c, who, note_id, of_others=who.may(Action.MANAGE_USERS))
+        notes.remove(c, user, note_id, of_others=user.may(Action.MANAGE_USERS))

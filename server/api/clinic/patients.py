@@ -1,4 +1,4 @@
-"""Patients, under the clinic's own pseudonyms."""
+"""Patients, identified by the clinic's own pseudonyms."""
 
 from __future__ import annotations
 
@@ -31,22 +31,22 @@ router = APIRouter(route_class=StrictJsonRoute, prefix="/patients", tags=["patie
 def list_patients(
     db: Db,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    user: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200, description="part of a code or a note")] = "",
     limit: Annotated[int, Query(ge=1, le=1000)] = 200,
     offset: Annotated[int, Query(ge=0, le=10**9)] = 0,
 ) -> list[patients.Patient]:
-    """All patients, the latest visit first."""
+    """List all patients, latest visit first."""
     with db.read() as c:
-        found = patients.list_patients(c, who, search=q, limit=limit, offset=offset)
-    trail.record_watched(who, "patient.listed", "patient", None)
-    return found
+        rows = patients.list_patients(c, user, search=q, limit=limit, offset=offset)
+    trail.record_watched(user, "patient.listed", "patient", None)
+    return rows
 
 
 class _CodeDoor:
-    """Transactions that give a patient a code, which tell whoever guesses that somebody has it.
+    """Transactions that assign a code to a patient, which reveal whether a guessed code exists.
 
-    Codes of patients that one may not open are counted and recorded, as in an emergency.
+    Conflicts with codes of inaccessible patients are counted and recorded, as in emergency access.
     """
 
     def __init__(self, request: Request, db: Db, trail: OpenTrail, failures: Failures) -> None:
@@ -54,9 +54,9 @@ class _CodeDoor:
         self._db, self._trail, self._failures = db, trail, failures
 
     @contextmanager
-    def write(self, who: Identity) -> Iterator[Connection]:
-        """One writing transaction; raises Problem 429 after too many such codes."""
-        account, hidden = f"codes of {who.user_id}", None
+    def write(self, user: Identity) -> Iterator[Connection]:
+        """Writing transaction; raises Problem 429 after too many conflicts with such codes."""
+        account, hidden = f"codes of {user.user_id}", None
         # counted before it is tried: a burst of guesses cannot pass before the first is counted
         begun = self._failures.begin(account, self._address)
         try:
@@ -65,12 +65,12 @@ class _CodeDoor:
                     yield c
                 except patients.CodeTaken as taken:
                     one = taken.patient_id
-                    if one is not None and not may_open(c, who, {"patient_id": one}):
+                    if one is not None and not may_open(c, user, {"patient_id": one}):
                         hidden = one
                     raise
         except patients.CodeTaken:
             if hidden is not None:
-                self._trail.record_opened(who, "patient.code_refused", "patient", hidden)
+                self._trail.record_opened(user, "patient.code_refused", "patient", hidden)
             raise
         finally:
             if hidden is None:
@@ -82,24 +82,24 @@ CodeDoor = Annotated[_CodeDoor, Depends()]
 
 @router.post("", status_code=201, response_model=patients.Patient, responses=refusals(409, 429))
 def add_patient(
-    body: schemas.PatientNew, door: CodeDoor, who: Annotated[Identity, require(Action.WRITE_PATIENT)]
+    body: schemas.PatientNew, door: CodeDoor, user: Annotated[Identity, require(Action.WRITE_PATIENT)]
 ) -> patients.Patient:
     """Add a patient."""
-    with door.write(who) as c:
-        made = patients.create(c, who, **body.values())
-        care_teams.add_maker(c, who, made.id)
-        return made
+    with door.write(user) as c:
+        patient = patients.create(c, user, **body.values())
+        care_teams.add_maker(c, user, patient.id)
+        return patient
 
 
 @router.get("/{patient_id}", response_model=patients.Patient)
 def read_patient(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> patients.Patient:
     """Open a patient."""
     with db.read() as c:
-        found = patients.get(c, patient_id)
-    trail.record_opened(who, "patient.opened", "patient", patient_id)
-    return found
+        patient = patients.get(c, patient_id)
+    trail.record_opened(user, "patient.opened", "patient", patient_id)
+    return patient
 
 
 @router.patch("/{patient_id}", response_model=patients.Patient, responses=refusals(409, 429))
@@ -108,12 +108,12 @@ def change_patient(
     body: schemas.PatientChange,
     db: Db,
     door: CodeDoor,
-    who: Annotated[Identity, require(Action.WRITE_PATIENT)],
+    user: Annotated[Identity, require(Action.WRITE_PATIENT)],
 ) -> patients.Patient:
-    """Change a patient; members left out stay as they are."""
+    """Change a patient; omitted fields are unchanged."""
     values = body.values()
-    with door.write(who) if "code" in values else db.write() as c:
-        return patients.change(c, who, patient_id, values)
+    with door.write(user) if "code" in values else db.write() as c:
+        return patients.change(c, user, patient_id, values)
 
 
 @router.delete("/{patient_id}", status_code=204, responses=refusals(409))
@@ -124,16 +124,16 @@ def delete_patient(
     reviewed: Reviewed,
     settings: Config,
     hub: LiveHub,
-    who: Annotated[Identity, require(Action.DELETE_PATIENT)],
+    user: Annotated[Identity, require(Action.DELETE_PATIENT)],
 ) -> None:
-    """Remove a patient with every session, recording and result, for ever; only the audit rows stay."""
+    """Permanently delete a patient with all sessions, recordings and results; only audit rows remain."""
     with db.read() as c:
         if confirm.strip() == patients.get(c, patient_id).code:
             visits = [visit.id for visit in sessions.of_patient(c, patient_id)]
         else:
             visits = []
     hub.drop_from_thread(visits)
-    erasure.erase_patient(db, reviewed, settings, who, patient_id, confirm=confirm)
+    erasure.erase_patient(db, reviewed, settings, user, patient_id, confirm=confirm)
 
 
 @router.get(
@@ -149,26 +149,26 @@ def export(
     blobs: Blobs,
     settings: Config,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.EXPORT_PATIENT)],
+    user: Annotated[Identity, require(Action.EXPORT_PATIENT)],
 ) -> StreamingResponse:
-    """Everything that is stored of a patient: rows as JSON, who opened what, and all files."""
-    key_file = settings.identity_key_file if who.may(Action.READ_IDENTITY) else None
+    """All stored data of a patient: rows as JSON, access log, and all files."""
+    key_file = settings.identity_key_file if user.may(Action.READ_IDENTITY) else None
     pieces = patient_export.export_patient(db, blobs, patient_id, key_file)
-    trail.record_opened(who, "patient.exported", "patient", patient_id)
+    trail.record_opened(user, "patient.exported", "patient", patient_id)
     headers = {"Content-Disposition": write_disposition(f"patient-{patient_id[:8]}.zip")}
     return StreamingResponse(pieces, media_type="application/zip", headers=headers)
 
 
 @router.get("/{patient_id}/sessions", response_model=list[sessions.Session])
 def list_sessions(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[sessions.Session]:
-    """The patient's visits, the newest first."""
+    """List the patient's visits, newest first."""
     with db.read() as c:
         patients.get(c, patient_id)
-        found = sessions.of_patient(c, patient_id)
-    trail.record_opened(who, "sessions.opened", "patient", patient_id)
-    return found
+        rows = sessions.of_patient(c, patient_id)
+    trail.record_opened(user, "sessions.opened", "patient", patient_id)
+    return rows
 
 
 @router.post(
@@ -178,13 +178,13 @@ def add_session(
     patient_id: Id,
     body: schemas.PlannedSessionNew,
     db: Db,
-    who: Annotated[Identity, require(Action.CREATE_SESSION)],
+    user: Annotated[Identity, require(Action.CREATE_SESSION)],
 ) -> sessions.Session:
     """Add a visit."""
     values = body.values()
     planned = values.pop("planned_visit_id", None)
     with db.write() as c:
-        made = sessions.create(c, who, patient_id, **values)
+        session = sessions.create(c, user, patient_id, **values)
         if planned is not None:
-            programmes.change_visit(c, who, planned, {"session_id": made.id})
-        return made
+            programmes.change_visit(c, user, planned, {"session_id": session.id})
+        return session

@@ -1,4 +1,4 @@
-"""Programmes: the visits planned for a patient, and the sessions that took place of them."""
+"""Training programmes: visits planned for a patient, and the sessions held."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Planner = Annotated[Identity, require(Action.WRITE_SESSION)]
 
 @router.get("/patients/{patient_id}/programmes", response_model=list[programmes.Programme])
 def list_programmes(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> list[programmes.Programme]:
-    """The patient's programmes, the newest first, with what was done, is missing and comes next."""
+    """List the patient's programmes, newest first, with completed, missed and upcoming visits."""
     with db.read() as c:
         patients.get(c, patient_id)
-        found = programmes.of_patient(c, patient_id)
-    trail.record_opened(who, "programmes.opened", "patient", patient_id)
-    return found
+        rows = programmes.of_patient(c, patient_id)
+    trail.record_opened(user, "programmes.opened", "patient", patient_id)
+    return rows
 
 
 @router.post(
@@ -37,23 +37,25 @@ def list_programmes(
     response_model=programmes.Programme,
     responses=refusals(409),
 )
-def start_programme(patient_id: Id, body: schemas.ProgrammeNew, db: Db, who: Planner) -> programmes.Programme:
-    """Put the patient on a programme."""
+def start_programme(
+    patient_id: Id, body: schemas.ProgrammeNew, db: Db, user: Planner
+) -> programmes.Programme:
+    """Start a programme for the patient."""
     with db.write() as c:
-        return programmes.start(c, who, patient_id, **body.values())
+        return programmes.start(c, user, patient_id, **body.values())
 
 
 @router.delete("/programmes/{programme_id}", status_code=204)
-def end_programme(programme_id: Id, db: Db, who: Planner) -> None:
-    """Remove a programme with its plan; the sessions stay."""
+def end_programme(programme_id: Id, db: Db, user: Planner) -> None:
+    """Remove a programme and its plan; its sessions remain."""
     with db.write() as c:
-        programmes.end(c, who, programme_id)
+        programmes.end(c, user, programme_id)
 
 
 @router.patch("/planned-visits/{visit_id}", response_model=programmes.Programme, responses=refusals(409))
 def change_planned_visit(
-    visit_id: Id, body: schemas.PlannedVisitChange, db: Db, who: Planner
+    visit_id: Id, body: schemas.PlannedVisitChange, db: Db, user: Planner
 ) -> programmes.Programme:
-    """Move a planned visit, or say which session it was; members left out stay as they are."""
+    """Reschedule a planned visit or link it to a session; omitted fields are unchanged."""
     with db.write() as c:
-        return programmes.change_visit(c, who, visit_id, body.values())
+        return programmes.change_visit(c, user, visit_id, body.values())

@@ -1,4 +1,4 @@
-"""Sessions: one visit's recording, what was found in it, and its mapping."""
+"""Sessions: the recording of one visit, its inspection and its mapping."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}",
 
 @router.get("", response_model=sessions.Session)
 def read_session(
-    session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
+    session_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> sessions.Session:
     """Open a session."""
     with db.read() as c:
-        found = sessions.get(c, session_id)
-    trail.record_opened(who, "session.opened", "session", session_id)
-    return found
+        session = sessions.get(c, session_id)
+    trail.record_opened(user, "session.opened", "session", session_id)
+    return session
 
 
 @router.patch("", response_model=sessions.Session)
@@ -39,11 +39,11 @@ def change_session(
     session_id: Id,
     body: schemas.SessionChange,
     db: Db,
-    who: Annotated[Identity, require(Action.WRITE_SESSION)],
+    user: Annotated[Identity, require(Action.WRITE_SESSION)],
 ) -> sessions.Session:
-    """Change a session; members left out stay as they are."""
+    """Change a session; omitted fields are unchanged."""
     with db.write() as c:
-        return sessions.change(c, who, session_id, body.values())
+        return sessions.change(c, user, session_id, body.values())
 
 
 @router.delete("", status_code=204)
@@ -53,43 +53,43 @@ def delete_session(
     reviewed: Reviewed,
     settings: Config,
     hub: LiveHub,
-    who: Annotated[Identity, require(Action.DELETE_SESSION)],
+    user: Annotated[Identity, require(Action.DELETE_SESSION)],
 ) -> None:
-    """Remove a session with its recordings and results, for ever; only the audit rows stay."""
+    """Permanently delete a session with its recordings and results; only audit rows remain."""
     hub.drop_from_thread([session_id])
-    erasure.erase_session(db, reviewed, settings, who, session_id)
+    erasure.erase_session(db, reviewed, settings, user, session_id)
 
 
 @router.get("/recording", response_model=schemas.RecordingAnswer)
 def read_recording(
-    session_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_SESSION)]
+    session_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> schemas.RecordingAnswer:
-    """The current upload set: its files, what was found in them, the mapping."""
+    """The current upload set: files, inspection results and mapping."""
     with db.read() as c:
-        found = recordings.current(c, session_id)
-    trail.record_watched(who, "recording.opened", "session", session_id)
-    if found is None:
+        recording = recordings.current(c, session_id)
+    trail.record_watched(user, "recording.opened", "session", session_id)
+    if recording is None:
         raise NotFound("recording of session", session_id)
-    return make_answer(schemas.RecordingAnswer, found)
+    return make_answer(schemas.RecordingAnswer, recording)
 
 
 @router.put("/manifest", response_model=schemas.RecordingAnswer, responses=refusals(409))
 def set_manifest(
-    session_id: Id, body: schemas.Json, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, body: schemas.Json, db: Db, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> schemas.RecordingAnswer:
     """Set the mapping (docs/reference/formats.md); the next analysis uses it."""
     with db.write() as c:
-        return make_answer(schemas.RecordingAnswer, recordings.set_manifest(c, who, session_id, body))
+        return make_answer(schemas.RecordingAnswer, recordings.set_manifest(c, user, session_id, body))
 
 
 @router.post("/inspections", status_code=202, response_model=JobView, responses=refusals(409))
 def inspect(
-    session_id: Id, db: Db, queue: Queue, blobs: Blobs, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, db: Db, queue: Queue, blobs: Blobs, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> JobView:
-    """Ask a worker what is in the files; tables of a known shape are read as those before them."""
+    """Request an inspection of the files; tables of a known shape are mapped like earlier ones."""
     with db.read() as c:
-        known = tables.find_known(c, blobs, session_id)
+        shapes = tables.find_known(c, blobs, session_id)
     with db.write() as c:
-        for shape in known:
-            tables.map_tables(c, who, session_id, shape.files, shape.source)
-        return recordings.inspect(c, queue, who, session_id)
+        for shape in shapes:
+            tables.map_tables(c, user, session_id, shape.files, shape.source)
+        return recordings.inspect(c, queue, user, session_id)

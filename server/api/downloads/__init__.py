@@ -1,1 +1,1 @@
-"""Routes of exports, archives and studies."""
+"""Routes for exports, archives and studies."""

@@ -1,4 +1,4 @@
-"""The archive of a visit, to be kept or read by another Sagittal."""
+"""Archive of a visit, for storage or import into another installation."""
 
 from __future__ import annotations
 
@@ -37,26 +37,26 @@ def read_archive(
     blobs: Blobs,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> StreamingResponse:
-    """Recording, manifest, settings, results, tables and the signed report of what the pages show."""
+    """Recording, manifest, settings, results, tables and signed report of the displayed analysis."""
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
-        found = analyses.get_shown(c, session_id)
-        recording = recordings.get(c, found.recording_id)
-        edits = edit_log.edits_of(c, found.id)
-        known = controls.list_visits(c, patient, session)
+        record = analyses.get_shown(c, session_id)
+        recording = recordings.get(c, record.recording_id)
+        edits = edit_log.edits_of(c, record.id)
+        control_group = controls.list_visits(c, patient, session)
         signed = signed_reports.find_documents(c, session_id)
-    model = reports.read(reviewed, found, edits, patient, session, control_visits=known)[1]
+    model = reports.read(reviewed, record, edits, patient, session, control_visits=control_group)[1]
     tables = {"parameters.csv": parameters_csv(model), "curves.csv": curves_csv(model)}
     out = tempfile.TemporaryFile()  # noqa: SIM115 - the answer closes it
     try:
-        archives.write_archive(out, blobs, recording, found, edits, tables, signed)
+        archives.write_archive(out, blobs, recording, record, edits, tables, signed)
     except BaseException:
         out.close()
         raise
-    trail.record_opened(who, "archive.opened", "session", session_id, {"analysis_id": found.id})
+    trail.record_opened(user, "archive.opened", "session", session_id, {"analysis_id": record.id})
     size = out.tell()
     out.seek(0)
     headers = {

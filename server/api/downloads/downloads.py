@@ -1,4 +1,4 @@
-"""Answers that a browser saves as a file."""
+"""Responses that a browser saves as a file."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ TYPES = {
 
 
 def attachment(content: bytes, name: str, media_type: str | None = None) -> Response:
-    """Return a file to save; its name may be any Unicode (RFC 6266, RFC 8187)."""
+    """Return a file download; its name may contain any Unicode characters (RFC 6266, RFC 8187)."""
     if media_type is None:
         media_type = TYPES.get(name[name.rfind(".") :], "application/octet-stream")
     return Response(content, media_type=media_type, headers={"Content-Disposition": write_disposition(name)})
 
 
 def write_disposition(name: str) -> str:
-    """Say that an answer is a file to save, and how it is called."""
+    """Content-Disposition header of a file download with this name."""
     plain = "".join(ch if ch.isascii() and ch.isprintable() and ch not in '"\\%' else "_" for ch in name)
     return f"attachment; filename=\"{plain}\"; filename*=UTF-8''{quote(name, safe='')}"

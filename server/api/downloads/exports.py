@@ -1,4 +1,4 @@
-"""Exports of a visit for other programs: listed, asked for; downloaded as files of the analysis."""
+"""Exports of a visit for other programs: list and request; downloads are files of the analysis."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 class ExportNew(schemas.Request):
-    """Which format is wanted."""
+    """The requested format."""
 
     kind: Annotated[ExportName, Field(description="as docs/reference/exports.md names them")]
 
@@ -33,18 +33,18 @@ class ExportNew(schemas.Request):
 @router.post(
     "/sessions/{session_id}/exports", status_code=202, response_model=JobView, responses=refusals(404, 409)
 )
-def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, who: Reader) -> JobView:
-    """Write the shown analysis for another program, with the edits that count; the same is written once."""
+def start(session_id: Id, body: ExportNew, db: Db, queue: Queue, user: Reader) -> JobView:
+    """Export the displayed analysis with its current edits; repeated requests return the same export."""
     with db.write() as c:
-        return exports.submit(c, queue, who, session_id, kind=body.kind)
+        return exports.submit(c, queue, user, session_id, kind=body.kind)
 
 
 @router.get("/sessions/{session_id}/exports", response_model=list[exports.ExportOffer])
-def list_exports(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[exports.ExportOffer]:
-    """The formats of the shown analysis; one with a `file` can be downloaded among the analysis's files."""
+def list_exports(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[exports.ExportOffer]:
+    """List export formats of the displayed analysis; one with a `file` can be downloaded with its files."""
     with db.read() as c:
-        found = analyses.get_shown(c, session_id)
-        session, patient = sessions.get(c, session_id), patients.get(c, found.patient_id)
-        offers = exports.list_offers(c, patient, session, found)
-    trail.record_watched(who, "exports.opened", "session", session_id)
+        record = analyses.get_shown(c, session_id)
+        session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
+        offers = exports.list_offers(c, patient, session, record)
+    trail.record_watched(user, "exports.opened", "session", session_id)
     return offers

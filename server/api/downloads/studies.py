@@ -1,4 +1,4 @@
-"""The tables of a study over many visits."""
+"""Study tables over many visits."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def make_study(
     settings: Config,
     trail: OpenTrail,
     choice: StudyVisits,
-    who: Annotated[Identity, require(Action.EXPORT_STUDY)],
+    user: Annotated[Identity, require(Action.EXPORT_STUDY)],
 ) -> Response:
-    """All strides and all takes of the chosen visits as they count, as CSV and Parquet, by pseudonyms."""
-    content, visits = study_maker.fetch_study(db, settings, who, choice)
+    """Tables of all strides and trials of the selected visits, as CSV and Parquet, pseudonymized."""
+    content, visits = study_maker.fetch_study(db, settings, user, choice)
     for visit in visits:
-        trail.record_opened(who, "study.exported", "session", visit, {"visits": len(visits)})
+        trail.record_opened(user, "study.exported", "session", visit, {"visits": len(visits)})
     return attachment(content, "study.zip")

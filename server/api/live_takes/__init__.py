@@ -1,1 +1,1 @@
-"""Routes of live takes."""
+"""Routes for live trials."""

@@ -1,4 +1,4 @@
-"""The film of the tablet's camera in pieces (docs/reference/live-protocol.md); the take's token opens it."""
+"""Chunked upload of the tablet's video (docs/reference/live-protocol.md), authorized by the trial's token."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Token = Annotated[str, Depends(_read_token)]
 
 @router.post("", response_model=films.FilmProgress, responses=refusals(401), openapi_extra=PUBLIC)
 def begin_film(take_id: Id, body: schemas.FilmBeginning, token: Token, intake: Films) -> films.FilmProgress:
-    """Begin the film of a take, or ask how far it is; it is kept who let the person be filmed."""
+    """Start the video of a trial, or query its progress; the user who confirmed consent is recorded."""
     return intake.begin(take_id, token, body.began_us, consent=body.consent)
 
 
@@ -56,7 +56,7 @@ async def add_piece(
     token: Token,
     intake: Films,
 ) -> films.FilmProgress:
-    """Keep a piece; the answer comes when it is on the disk. A piece may come twice, a gap is refused."""
+    """Add a chunk; the response follows once it is on disk. Repeated chunks are accepted, gaps rejected."""
     read_size(request, films.MOST_PIECE_BYTES)
     piece = bytearray()
     try:
@@ -73,5 +73,5 @@ async def add_piece(
 
 @router.post("/end", response_model=schemas.EndedFilm, responses=refusals(401, 409), openapi_extra=PUBLIC)
 def end_film(take_id: Id, token: Token, intake: Films) -> schemas.EndedFilm:
-    """Set the film beside its take, once that is over; of a take that came to nothing it is discarded."""
+    """Attach the video to its trial after the trial ended; discarded if there is no recording."""
     return schemas.EndedFilm(kept=intake.end(take_id, token))

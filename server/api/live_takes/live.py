@@ -1,4 +1,4 @@
-"""Live takes of a session: open, pair, command, end; the sockets are in server/live."""
+"""Live trials of a session: open, pair, command, end; for the sockets see server/live."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ SOCKET = "/api/v1/live"
 @router.post(
     "/sessions/{session_id}/live", status_code=201, response_model=schemas.OpenedTake, responses=refusals(409)
 )
-async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
-    """Open a take; a tablet joins it with the code within ten minutes."""
+async def open_take(session_id: Id, db: Db, hub: LiveHub, user: Therapist) -> schemas.OpenedTake:
+    """Open a live trial; a tablet joins it with the code within ten minutes."""
 
     def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
-            return live.open_take(c, who, session_id, hub.owner)
+            return live.open_take(c, user, session_id, hub.owner)
 
     take, code = await run_in_threadpool(write)
     hub.tell_row(take)
@@ -39,11 +39,11 @@ async def open_take(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> sch
 
 
 @router.get("/sessions/{session_id}/live", response_model=schemas.LiveState)
-def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Therapist) -> dict[str, Any]:
-    """Where the session's newest take stands."""
+def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, user: Therapist) -> dict[str, Any]:
+    """State of the session's latest live trial."""
     with db.read() as c:
         sessions.get(c, session_id)
-    trail.record_watched(who, "live.watched", "session", session_id)
+    trail.record_watched(user, "live.watched", "session", session_id)
     return hub.standing(session_id)
 
 
@@ -53,12 +53,14 @@ def read_take(session_id: Id, db: Db, hub: LiveHub, trail: OpenTrail, who: Thera
     response_model=schemas.OpenedTake,
     responses=refusals(409),
 )
-async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> schemas.OpenedTake:
-    """Give another code; the one before ends, and when it is used the tablet before is sent away."""
+async def give_code(session_id: Id, db: Db, hub: LiveHub, user: Therapist) -> schemas.OpenedTake:
+    """Issue another pairing code, which replaces the previous one; using it disconnects the earlier
+    tablet.
+    """
 
     def write() -> tuple[live.LiveTakeRecord, str]:
         with db.write() as c:
-            return live.new_code(c, who, session_id)
+            return live.new_code(c, user, session_id)
 
     take, code = await run_in_threadpool(write)
     hub.tell_row(take)
@@ -69,26 +71,26 @@ async def give_code(session_id: Id, db: Db, hub: LiveHub, who: Therapist) -> sch
     "/sessions/{session_id}/live/commands", response_model=schemas.LiveState, responses=refusals(409)
 )
 async def give_command(
-    session_id: Id, body: schemas.LiveCommand, hub: LiveHub, who: Therapist
+    session_id: Id, body: schemas.LiveCommand, hub: LiveHub, user: Therapist
 ) -> dict[str, Any]:
-    """Carry a command out; it is kept with its time and who gave it."""
-    return await hub.command(who, session_id, body.command, body.value, body.t_s)
+    """Carry out a command; it is stored with its time and author."""
+    return await hub.command(user, session_id, body.command, body.value, body.t_s)
 
 
 @router.post("/sessions/{session_id}/live/close", response_model=schemas.TakeAnswer, responses=refusals(409))
-async def close_take(session_id: Id, hub: LiveHub, who: Therapist) -> schemas.TakeAnswer:
-    """End the take without the tablet; what has come becomes the session's recording and is analysed."""
-    return make_answer(schemas.TakeAnswer, await hub.close(who, session_id))
+async def close_take(session_id: Id, hub: LiveHub, user: Therapist) -> schemas.TakeAnswer:
+    """End the trial without the tablet; the received data become the session's recording and are analysed."""
+    return make_answer(schemas.TakeAnswer, await hub.close(user, session_id))
 
 
 @router.get("/sessions/{session_id}/live/events", response_model=list[live_events.LiveEvent])
-def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> list[live_events.LiveEvent]:
-    """What happened in the session's takes, in order."""
+def list_events(session_id: Id, db: Db, trail: OpenTrail, user: Therapist) -> list[live_events.LiveEvent]:
+    """List events of the session's live trials in order."""
     with db.read() as c:
         sessions.get(c, session_id)
-        found = [event for take in live.takes_of(c, session_id) for event in live_events.events(c, take.id)]
-    trail.record_watched(who, "live.events_opened", "session", session_id)
-    return found
+        rows = [event for take in live.takes_of(c, session_id) for event in live_events.events(c, take.id)]
+    trail.record_watched(user, "live.events_opened", "session", session_id)
+    return rows
 
 
 @router.post(
@@ -102,11 +104,11 @@ def list_events(session_id: Id, db: Db, trail: OpenTrail, who: Therapist) -> lis
 async def pair(
     request: Request, body: schemas.PairingCode, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
 ) -> schemas.PairedTablet:
-    """Join a tablet to a take by its code; a code works once."""
+    """Join a tablet to a trial by its single-use code."""
     # counted per address: a stranger cannot keep other tablets out by guessing
     address = address_of(request)
-    who = f"pairing from {address}"
-    await run_in_threadpool(failures.check, who, address)
+    client = f"pairing from {address}"
+    await run_in_threadpool(failures.check, client, address)
 
     def write() -> tuple[live.TabletAccess, live.LiveTakeRecord]:
         with db.write() as c:
@@ -116,10 +118,10 @@ async def pair(
     try:
         paired, take = await run_in_threadpool(write)
     except live.CodeNotValid:
-        await run_in_threadpool(failures.fail, who, address)
+        await run_in_threadpool(failures.fail, client, address)
         await run_in_threadpool(trail.record_refused, "live.pairing_failed", "live", None, address)
         raise
-    await run_in_threadpool(failures.succeed, who, address)
+    await run_in_threadpool(failures.succeed, client, address)
     hub.tell_row(take)
     return make_answer(schemas.PairedTablet, paired, socket=SOCKET)
 

@@ -1,8 +1,8 @@
-"""The browsers' socket of a session: `WS /sessions/{sid}/live/feed`, JSON texts (docs/reference/api.md,
+"""Websocket of a session for browsers: `WS /sessions/{sid}/live/feed`, JSON texts (docs/reference/api.md,
 Live).
 
-Only goes down; commands come over the API. While a take streams, watching it counts as activity: nobody is
-signed out in the middle of a training.
+Messages are sent by the server only; commands use the API. Watching a streaming trial counts as activity, so
+that users are not signed out during a training.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ GONE = 4404
 
 
 @router.websocket("/sessions/{sid}/live/feed")
-async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]) -> None:
-    """Tell a browser what happens."""
+async def feed(ws: WebSocket, sid: Id, user: Annotated[Identity, require(Action.RUN_LIVE)]) -> None:
+    """Send updates of the session's live trial to a browser."""
     state = state_of(ws)
     hub, db = state.hub, state.db
     await ws.accept()
@@ -43,7 +43,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
     def look() -> bytes:
         with db.read() as c:
             sessions.get(c, sid)
-        state.trail.record_watched(who, "live.watched", "session", sid)
+        state.trail.record_watched(user, "live.watched", "session", sid)
         return msgspec.json.encode(hub.standing(sid))
 
     try:
@@ -56,7 +56,7 @@ async def feed(ws: WebSocket, sid: Id, who: Annotated[Identity, require(Action.R
         viewer.put("state", first)
         tasks = [
             moved := asyncio.create_task(_until_moved(ws, sid)),
-            over := asyncio.create_task(wait_for_end(lambda: _find_end(ws, hub, sid, who))),
+            over := asyncio.create_task(wait_for_end(lambda: _find_end(ws, hub, sid, user))),
             asyncio.create_task(_down(ws, viewer)),
             asyncio.create_task(_until_gone(ws)),
         ]
@@ -82,7 +82,9 @@ async def _down(ws: WebSocket, viewer: BrowserQueue) -> None:
 
 
 async def _until_moved(ws: WebSocket, sid: str) -> None:
-    """Return when another web server has the session's take: the browser then comes back and is led there."""
+    """Return when the session's trial moves to another web server; the browser then reconnects to that
+    one.
+    """
     state = state_of(ws)
     nodes = state.nodes
     while True:
@@ -100,9 +102,9 @@ async def _until_gone(ws: WebSocket) -> None:
         pass
 
 
-def _find_end(ws: WebSocket, hub: Hub, sid: str, who: Identity) -> str | None:
-    """Why the feed must end; a running live view counts as activity."""
+def _find_end(ws: WebSocket, hub: Hub, sid: str, user: Identity) -> str | None:
+    """Reason why the feed must end; a running live view counts as activity."""
     take = hub.take_of(sid)
     if take is not None and take.tablet is not None:
-        state_of(ws).logins.touch(who.login_id)
+        state_of(ws).logins.touch(user.login_id)
     return find_end(ws)

@@ -1,4 +1,4 @@
-"""What goes over the wire about live takes; the feed's messages are in docs/reference/api.md."""
+"""Schemas of live trials; the messages of the feed are documented in docs/reference/api.md."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from sagittal.server.live.take import TherapistMark
 
 @dataclass(frozen=True)
 class OpenedTake:
-    """A take that waits for a tablet, and its code; the code is told this once."""
+    """A live trial waiting for a tablet, with its code, which is shown only once."""
 
     id: str
     session_id: str
@@ -25,11 +25,11 @@ class OpenedTake:
 
 @dataclass(frozen=True)
 class TakeAnswer:
-    """A live take.
+    """A live trial.
 
     `state` is pairing, open (a tablet has joined), streaming, finished (by the tablet) or closed (here);
-    `problem` finish_mismatch: the tablet counted or hashed otherwise at the end. node_away: the web
-    server that has the take is away.
+    `problem` finish_mismatch: the tablet's final count or hash differs. node_away: the web server that runs
+    the trial is unavailable.
     """
 
     id: str
@@ -46,7 +46,7 @@ class TakeAnswer:
 
 @dataclass(frozen=True)
 class LiveSensor:
-    """A sensor as the recorder knows it; frames have it with what the estimator counts."""
+    """A sensor as listed by the recorder; in frames, with the statistics of the estimator."""
 
     id: str
     segment: str | None
@@ -60,7 +60,7 @@ class LiveSensor:
 
 @dataclass(frozen=True)
 class LiveState:
-    """Where a session's newest take stands: the feed's `state` message."""
+    """State of a session's latest live trial: the feed's `state` message."""
 
     type: Literal["state"]
     take: Annotated[str | None, Field(description="null: there was none yet")]
@@ -82,16 +82,16 @@ class LiveState:
 
 
 class PairingCode(Request):
-    """The code on the therapist's screen, in any case, spaces and hyphens do not count."""
+    """The code on the therapist's screen; case, spaces and hyphens are ignored."""
 
     code: Annotated[str, StringConstraints(min_length=1, max_length=40)]
 
 
 class FilmBeginning(Request):
-    """A tablet begins to film.
+    """Start of a video on a tablet.
 
-    `began_us` is the first picture's time by the clock that stamps `sent_us` of its batches; `consent`, that
-    the person agreed to be filmed.
+    `began_us` is the time of the first frame by the clock that stamps `sent_us` of its batches; `consent`
+    confirms that the patient agreed to be filmed.
     """
 
     consent: bool
@@ -100,16 +100,16 @@ class FilmBeginning(Request):
 
 @dataclass(frozen=True)
 class EndedFilm:
-    """What became of a film: whether it stands beside the take."""
+    """Outcome of a video: whether it is attached to the trial."""
 
     kept: bool
 
 
 @dataclass(frozen=True)
 class PairedTablet:
-    """What the tablet needs to stream; the token opens this take only, for twelve hours.
+    """Connection data for the tablet; the token is valid for this trial only, for twelve hours.
 
-    `remembered` has the serial numbers of the clinic's sensors with the segment each was worn on last.
+    `remembered` maps serial numbers of the clinic's sensors to their last segments.
     """
 
     token: str
@@ -121,9 +121,10 @@ class PairedTablet:
 
 
 class LiveCommand(Request):
-    """A command; feedback and pause take true or false, level steps (+ easier), mark and ghost a text.
+    """A command; feedback and pause take true or false, level takes steps (+ easier), mark and ghost a text.
 
-    test takes "go", "repeat", or when the functional test began and ended."""
+    test takes "go", "repeat", or start and end of the functional test.
+    """
 
     command: Literal[
         "start",

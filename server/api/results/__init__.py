@@ -1,1 +1,1 @@
-"""Routes of analyses and what is read from them."""
+"""Routes for analyses and their results."""

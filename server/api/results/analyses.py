@@ -1,4 +1,4 @@
-"""Analyses: asked for, listed, and their files downloaded."""
+"""Analyses: request, list, and download their files."""
 
 from __future__ import annotations
 
@@ -32,32 +32,32 @@ def analyse(
     body: schemas.AnalysisNew,
     db: Db,
     queue: Queue,
-    who: Annotated[Identity, require(Action.ANALYSE)],
+    user: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Ask for an analysis; the same files, mapping, settings and version are analysed once."""
+    """Request an analysis; identical files, mapping, settings and version are analysed only once."""
     with db.write() as c:
         if body.manifest is not None:
-            recordings.set_manifest(c, who, session_id, body.manifest)
-        return analyses.submit(c, queue, who, session_id, config=body.config)
+            recordings.set_manifest(c, user, session_id, body.manifest)
+        return analyses.submit(c, queue, user, session_id, config=body.config)
 
 
 @router.get("/sessions/{session_id}/analyses", response_model=list[schemas.AnalysisAnswer])
-def list_analyses(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[schemas.AnalysisAnswer]:
-    """The finished analyses of a session, the one its pages show first."""
+def list_analyses(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[schemas.AnalysisAnswer]:
+    """List finished analyses of a session, the displayed one first."""
     with db.read() as c:
         sessions.get(c, session_id)
-        made = analyses.of_session(c, session_id)
-    trail.record_watched(who, "analyses.opened", "session", session_id)
-    return [_shown(found) for found in made]
+        records = analyses.of_session(c, session_id)
+    trail.record_watched(user, "analyses.opened", "session", session_id)
+    return [_shown(record) for record in records]
 
 
 @router.get("/analyses/{analysis_id}", response_model=schemas.AnalysisAnswer)
-def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> schemas.AnalysisAnswer:
-    """Open an analysis: what went in, by what version, and which files came out."""
+def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, user: Reader) -> schemas.AnalysisAnswer:
+    """Inputs, version and result files of an analysis."""
     with db.read() as c:
-        found = analyses.get(c, analysis_id)
-    trail.record_opened(who, "analysis.opened", "analysis", analysis_id)
-    return _shown(found)
+        record = analyses.get(c, analysis_id)
+    trail.record_opened(user, "analysis.opened", "analysis", analysis_id)
+    return _shown(record)
 
 
 @router.get(
@@ -65,16 +65,16 @@ def read_analysis(analysis_id: Id, db: Db, trail: OpenTrail, who: Reader) -> sch
     response_class=Response,
     responses=ANY_FILE,
 )
-def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
-    """Download a result file; its name says which analysis it is of, never of whom."""
+def read_file(analysis_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, user: Reader) -> Response:
+    """Download a result file; its name contains the id of the analysis but no patient data."""
     with db.read() as c:
-        found = analyses.get(c, analysis_id)
-    content = analyses.file_bytes(blobs, found, name)
-    trail.record_opened(who, "analysis.file_opened", "analysis", analysis_id, {"file": name})
+        record = analyses.get(c, analysis_id)
+    content = analyses.file_bytes(blobs, record, name)
+    trail.record_opened(user, "analysis.file_opened", "analysis", analysis_id, {"file": name})
     stem, dot, ending = name.rpartition(".")
     return attachment(content, f"{stem}-{analysis_id[:8]}{dot}{ending}")
 
 
-def _shown(found: analyses.AnalysisRecord) -> schemas.AnalysisAnswer:
-    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in found.files.items()]
-    return schemas.make_answer(schemas.AnalysisAnswer, found, files=files)
+def _shown(record: analyses.AnalysisRecord) -> schemas.AnalysisAnswer:
+    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in record.files.items()]
+    return schemas.make_answer(schemas.AnalysisAnswer, record, files=files)

@@ -1,4 +1,4 @@
-"""Two sessions of a patient compared, figure by figure."""
+"""Comparison of two sessions of a patient, parameter by parameter."""
 
 from __future__ import annotations
 
@@ -34,18 +34,17 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 @router.get("/{other_id}", response_model=None, responses=_JSON)
 def compare(
-    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> Response:
-    """Every figure before and after, its change against MDC and MCID, and what may be in the way."""
-    found = _opened(db, trail, who, session_id, other_id)
+    """All parameters before and after, changes against MDC and MCID, and reasons for caution."""
+    pair = _opened(db, trail, user, session_id, other_id)
     content = {
-        "before": _session(found.before),
-        "after": _session(found.after),
-        "comparable": found.comparable,
-        "cautions": found.cautions,
+        "before": _session(pair.before),
+        "after": _session(pair.after),
+        "comparable": pair.comparable,
+        "cautions": pair.cautions,
         "changes": [
-            {**vars(r.change), "words": r.words.verdict}
-            for r in comparisons.compare_sessions(reviewed, found)
+            {**vars(r.change), "words": r.words.verdict} for r in comparisons.compare_sessions(reviewed, pair)
         ],
     }
     return JSONResponse(reduce_to_plain(content))
@@ -53,19 +52,19 @@ def compare(
 
 @router.get("/{other_id}/changes.csv", response_class=Response, responses=_CSV)
 def compare_as_table(
-    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, other_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> Response:
-    """The same as a table."""
-    found = _opened(db, trail, who, session_id, other_id)
-    name = f"changes-{found.before.session.id[:8]}-{found.after.session.id[:8]}.csv"
-    return attachment(comparison_csv(comparisons.compare_sessions(reviewed, found)), name)
+    """The comparison as a table."""
+    pair = _opened(db, trail, user, session_id, other_id)
+    name = f"changes-{pair.before.session.id[:8]}-{pair.after.session.id[:8]}.csv"
+    return attachment(comparison_csv(comparisons.compare_sessions(reviewed, pair)), name)
 
 
-def _opened(db: Database, trail: AuditTrail, who: Identity, session_id: str, other_id: str) -> SessionPair:
+def _opened(db: Database, trail: AuditTrail, user: Identity, session_id: str, other_id: str) -> SessionPair:
     with db.read() as c:
-        found = comparisons.pair(c, session_id, other_id)
-    trail.record_opened(who, "comparison.opened", "session", session_id, {"with": other_id})
-    return found
+        session_pair = comparisons.pair(c, session_id, other_id)
+    trail.record_opened(user, "comparison.opened", "session", session_id, {"with": other_id})
+    return session_pair
 
 
 def _session(a: AnalysedSession) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The pose estimators one can ask for, with the sensors they need and the papers they come from."""
+"""Available pose estimators, with required sensors and references."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ router = APIRouter(prefix="/estimators", tags=["analyses"])
 
 @dataclass(frozen=True)
 class EstimatorAnswer:
-    """A pose estimator; `name` is what the settings of an analysis take as `poses.estimator`."""
+    """A pose estimator; `name` is the value of `poses.estimator` in the settings of an analysis."""
 
     name: str
     title: str
@@ -35,8 +35,8 @@ class EstimatorAnswer:
 
 
 @router.get("", response_model=list[EstimatorAnswer])
-def list_estimators(who: Annotated[Identity, require(Action.READ_API)]) -> list[EstimatorAnswer]:
-    """The estimators of this version, the best for all seven sensors first."""
+def list_estimators(user: Annotated[Identity, require(Action.READ_API)]) -> list[EstimatorAnswer]:
+    """List estimators of this version, the best for all seven sensors first."""
     return [_shown(estimator) for estimator in ESTIMATORS]
 
 

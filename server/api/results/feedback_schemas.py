@@ -1,4 +1,4 @@
-"""What goes over the wire about biofeedback: prescriptions, targets, strides with and without feedback."""
+"""Schemas of biofeedback: prescriptions, targets, strides with and without feedback."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]{1,64}$")]
 
 
 class TargetNew(Request):
-    """Where the value should be; mean and sd are entered for `manual` only, the others are looked up."""
+    """Target value; mean and sd are entered for `manual` only and looked up otherwise."""
 
     source: Source = "norm"
     mean: Number | None = None
@@ -29,7 +29,7 @@ class TargetNew(Request):
 
 
 class ScheduleNew(Request):
-    """Which strides get feedback."""
+    """Schedule of strides with feedback."""
 
     kind: Literal["every", "fading"] = "fading"
     shares_pct: Annotated[list[int], Field(max_length=20)] = Field(default=[100, 50, 0])
@@ -40,7 +40,7 @@ class ScheduleNew(Request):
 
 
 class ProgressionNew(Request):
-    """When it gets harder or easier; one level is `sd_per_level` sd of the target."""
+    """Rules for increasing or decreasing difficulty; one level is `sd_per_level` sd of the target."""
 
     automatic: bool = True
     window: int = 20
@@ -52,7 +52,7 @@ class ProgressionNew(Request):
 
 
 class StopRuleNew(Request):
-    """When feedback ends by itself; null = never for this reason."""
+    """Limits at which feedback ends automatically; null = no limit."""
 
     max_strides: int | None = None
     max_minutes: Number | None = 15.0
@@ -60,14 +60,14 @@ class StopRuleNew(Request):
 
 
 class GuardNew(Request):
-    """From which change beside the target on the therapist is told."""
+    """Side effects: changes in other parameters at which the therapist is notified."""
 
     other_change: Number | None = None
     gps_rise_deg: Number | None = 1.6
 
 
 class PrescriptionNew(Request):
-    """Feedback on one parameter of one side; members left out have their defaults."""
+    """Feedback on one parameter of one side; omitted fields have their defaults."""
 
     parameter: Name
     side: Side | None = None
@@ -86,7 +86,7 @@ class PrescriptionNew(Request):
 
 @dataclass(frozen=True)
 class PrescriptionAnswer:
-    """A prescription; it never changes: another one ends it."""
+    """A prescription; immutable, and ended by the next one."""
 
     id: str
     patient_id: str
@@ -99,7 +99,7 @@ class PrescriptionAnswer:
 
 @dataclass(frozen=True)
 class TargetOffer:
-    """What a source gives as target for this person; null with a reason where it gives nothing."""
+    """Target from one source for this patient; null with a reason if unavailable."""
 
     source: Source
     mean: float | None
@@ -110,7 +110,7 @@ class TargetOffer:
 
 @dataclass(frozen=True)
 class Feedback:
-    """Strides with and without feedback of a session's live take; empty with a reason where there is none."""
+    """Strides with and without feedback of a session's live trial; empty with a reason if there are none."""
 
     reason: str | None = None
     prescription: dict[str, Any] | None = None

@@ -1,4 +1,4 @@
-"""Orientation filters on a take: the list, references, comparisons asked for and their files."""
+"""Orientation filters on a trial: list, references, requested comparisons and their files."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ ReferenceName = Annotated[str, Path(max_length=500, description="any Unicode")]
 
 @dataclass(frozen=True)
 class FilterAnswer:
-    """An orientation filter; `name` is what a comparison takes."""
+    """An orientation filter; `name` identifies it in a comparison."""
 
     name: str
     label: Annotated[str, Field(description="what is only a reconstruction says so")]
@@ -52,7 +52,7 @@ class FilterAnswer:
 
 
 class FilterRunNew(schemas.Request):
-    """Which filters to run on the analysis that the session shows, and what to hold them against."""
+    """Filters to run on the displayed analysis, and the reference to compare with."""
 
     filters: Annotated[list[FilterName], Field(min_length=1, max_length=100)]
     magnetometer: bool = True
@@ -78,8 +78,8 @@ class FilterRunAnswer:
 
 
 @router.get("/filters", response_model=list[FilterAnswer])
-def list_filters(who: Annotated[Identity, require(Action.READ_API)]) -> list[FilterAnswer]:
-    """The orientation filters of this version, by engine."""
+def list_filters(user: Annotated[Identity, require(Action.READ_API)]) -> list[FilterAnswer]:
+    """List the orientation filters of this version, by engine."""
     return [schemas.make_answer(FilterAnswer, f) for f in FILTERS]
 
 
@@ -91,14 +91,14 @@ def compare(
     body: FilterRunNew,
     db: Db,
     queue: Queue,
-    who: Annotated[Identity, require(Action.ANALYSE)],
+    user: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Run filters on this take as one job; the same choice on the same analysis is run once."""
+    """Run filters on this trial as one job; identical requests are run once."""
     with db.write() as c:
         return filter_runs.submit(
             c,
             queue,
-            who,
+            user,
             session_id,
             filters=body.filters,
             magnetometer=body.magnetometer,
@@ -107,22 +107,22 @@ def compare(
 
 
 @router.get("/sessions/{session_id}/filter-runs", response_model=list[FilterRunAnswer])
-def list_runs(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[FilterRunAnswer]:
-    """The finished comparisons of a session, the newest first."""
+def list_runs(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[FilterRunAnswer]:
+    """List finished comparisons of a session, newest first."""
     with db.read() as c:
         sessions.get(c, session_id)
-        found = filter_runs.of_session(c, session_id)
-    trail.record_watched(who, "filter_runs.opened", "session", session_id)
-    return [_shown(run) for run in found]
+        runs = filter_runs.of_session(c, session_id)
+    trail.record_watched(user, "filter_runs.opened", "session", session_id)
+    return [_shown(run) for run in runs]
 
 
 @router.get("/filter-runs/{run_id}", response_model=FilterRunAnswer)
-def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnswer:
-    """Open a comparison: what went in, by what version, and which files came out."""
+def read_run(run_id: Id, db: Db, trail: OpenTrail, user: Reader) -> FilterRunAnswer:
+    """Inputs, version and result files of a comparison."""
     with db.read() as c:
-        found = filter_runs.get(c, run_id)
-    trail.record_opened(who, "filter_run.opened", "filter_run", run_id)
-    return _shown(found)
+        run = filter_runs.get(c, run_id)
+    trail.record_opened(user, "filter_run.opened", "filter_run", run_id)
+    return _shown(run)
 
 
 @router.get(
@@ -130,23 +130,23 @@ def read_run(run_id: Id, db: Db, trail: OpenTrail, who: Reader) -> FilterRunAnsw
     response_class=Response,
     responses=ANY_FILE,
 )
-def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader) -> Response:
-    """Download a file of a comparison; its name says which one it is of, never of whom."""
+def read_run_file(run_id: Id, name: str, db: Db, blobs: Blobs, trail: OpenTrail, user: Reader) -> Response:
+    """Download a file of a comparison; its name contains the id of the comparison but no patient data."""
     with db.read() as c:
-        found = filter_runs.get(c, run_id)
-    content = filter_runs.file_bytes(blobs, found, name)
-    trail.record_opened(who, "filter_run.file_opened", "filter_run", run_id, {"file": name})
+        run = filter_runs.get(c, run_id)
+    content = filter_runs.file_bytes(blobs, run, name)
+    trail.record_opened(user, "filter_run.file_opened", "filter_run", run_id, {"file": name})
     stem, dot, ending = name.rpartition(".")
     return attachment(content, f"{stem}-{run_id[:8]}{dot}{ending}")
 
 
 @references.get("", response_model=list[recordings.RecordedFile])
-def list_references(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[recordings.RecordedFile]:
-    """Orientations of other systems that were uploaded to compare with."""
+def list_references(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[recordings.RecordedFile]:
+    """List uploaded reference orientations of other systems."""
     with db.read() as c:
-        found = reference_files.list_files(c, session_id)
-    trail.record_watched(who, "references.opened", "session", session_id)
-    return found
+        rows = reference_files.list_files(c, session_id)
+    trail.record_watched(user, "references.opened", "session", session_id)
+    return rows
 
 
 @references.put(
@@ -163,12 +163,12 @@ async def put_reference(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Uploader,
+    user: Uploader,
 ) -> recordings.RecordedFile:
-    """Add a reference, an OpenSim .sto or a table of quaternions; the same name replaces it."""
+    """Add a reference, an OpenSim .sto file or a table of quaternions; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
     upload = await run_in_threadpool(
-        reference_files.receive_reference, db, blobs, settings, who, session_id, name, size
+        reference_files.receive_reference, db, blobs, settings, user, session_id, name, size
     )
     return await receive_body(request, upload)
 
@@ -179,22 +179,22 @@ async def put_reference(
     responses={200: {"description": "The file", **RAW_BODY}},
 )
 def read_reference(
-    session_id: Id, name: ReferenceName, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+    session_id: Id, name: ReferenceName, db: Db, blobs: Blobs, trail: OpenTrail, user: Reader
 ) -> Response:
     """Download a reference, byte for byte."""
     with db.read() as c:
         content = reference_files.file_bytes(c, blobs, session_id, name)
-    trail.record_opened(who, "reference.opened", "session", session_id)
+    trail.record_opened(user, "reference.opened", "session", session_id)
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 
 @references.delete("/{name:path}", status_code=204)
-def delete_reference(session_id: Id, name: ReferenceName, db: Db, who: Uploader) -> None:
-    """Take a reference away; comparisons that used it stay as they are."""
+def delete_reference(session_id: Id, name: ReferenceName, db: Db, user: Uploader) -> None:
+    """Delete a reference; comparisons that used it are unchanged."""
     with db.write() as c:
-        reference_files.remove(c, who, session_id, name)
+        reference_files.remove(c, user, session_id, name)
 
 
-def _shown(found: filter_runs.FilterRunRecord) -> FilterRunAnswer:
-    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in found.files.items()]
-    return schemas.make_answer(FilterRunAnswer, found, files=files)
+def _shown(run: filter_runs.FilterRunRecord) -> FilterRunAnswer:
+    files = [recordings.RecordedFile(name, blob.size, blob.sha256) for name, blob in run.files.items()]
+    return schemas.make_answer(FilterRunAnswer, run, files=files)

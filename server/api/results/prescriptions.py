@@ -1,4 +1,4 @@
-"""Prescriptions of biofeedback, the targets they may have, and what came of them in a session."""
+"""Biofeedback prescriptions, available targets, and outcomes of a session."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/patients/{patient_id}/prescriptions", response_model=list[schemas.PrescriptionAnswer])
-def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[dict[str, Any]]:
-    """The patient's prescriptions, the newest first; one that has not ended is in force."""
+def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[dict[str, Any]]:
+    """List the patient's prescriptions, newest first; at most one is in force."""
     with db.read() as c:
         patients.get(c, patient_id)
         written = prescriptions.of_patient(c, patient_id)
-    trail.record_opened(who, "prescriptions.opened", "patient", patient_id)
+    trail.record_opened(user, "prescriptions.opened", "patient", patient_id)
     return [_shown(w) for w in written]
 
 
@@ -49,20 +49,20 @@ def list_prescriptions(patient_id: Id, db: Db, trail: OpenTrail, who: Reader) ->
     "/patients/{patient_id}/prescriptions", status_code=201, response_model=schemas.PrescriptionAnswer
 )
 def write_prescription(
-    patient_id: Id, body: schemas.PrescriptionNew, db: Db, reviewed: Reviewed, who: Therapist
+    patient_id: Id, body: schemas.PrescriptionNew, db: Db, reviewed: Reviewed, user: Therapist
 ) -> dict[str, Any]:
     """Prescribe feedback; the prescription in force ends."""
     with db.write() as c:
-        return _shown(prescriptions.write(c, reviewed, who, patient_id, body.model_dump(exclude_unset=True)))
+        return _shown(prescriptions.write(c, reviewed, user, patient_id, body.model_dump(exclude_unset=True)))
 
 
 @router.post(
     "/prescriptions/{prescription_id}/end", response_model=schemas.PrescriptionAnswer, responses=refusals(409)
 )
-def end_prescription(prescription_id: Id, db: Db, who: Therapist) -> dict[str, Any]:
-    """End a prescription; the record stays."""
+def end_prescription(prescription_id: Id, db: Db, user: Therapist) -> dict[str, Any]:
+    """End a prescription; it remains on record."""
     with db.write() as c:
-        return _shown(prescriptions.end(c, who, prescription_id))
+        return _shown(prescriptions.end(c, user, prescription_id))
 
 
 @router.get("/patients/{patient_id}/targets", response_model=list[schemas.TargetOffer])
@@ -71,11 +71,11 @@ def read_targets(
     db: Db,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Reader,
+    user: Reader,
     parameter: Annotated[str, Query(max_length=64, description="one that a prescription can train")],
     side: Annotated[Side | None, Query(description="that is trained; none = both")] = None,
 ) -> list[dict[str, Any]]:
-    """What each source gives as target of a parameter for this person, or why it gives nothing."""
+    """Targets of a parameter for this patient by source, or reasons why unavailable."""
     trainable = list_trainable()
     if parameter not in trainable:
         raise Problem(
@@ -83,7 +83,7 @@ def read_targets(
         )
     with db.read() as c:
         walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))
-    trail.record_watched(who, "targets.opened", "patient", patient_id)
+    trail.record_watched(user, "targets.opened", "patient", patient_id)
     offers = [(source, targets.offer(walk, source, parameter, side)) for source in SOURCES]
     return [
         {
@@ -99,10 +99,10 @@ def read_targets(
 
 @router.get("/sessions/{session_id}/feedback", response_model=schemas.Feedback)
 def read_feedback(
-    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> dict[str, object]:
-    """Strides with and without feedback, probe blocks, level, side effects, and the retention test."""
-    gathered = _opened(db, trail, who, session_id)
+    """Strides with and without feedback, probe blocks, level, side effects and retention test."""
+    gathered = _opened(db, trail, user, session_id)
     view = feedback.view(reviewed, gathered)
     if view is not None:
         return view.to_json()
@@ -111,21 +111,21 @@ def read_feedback(
 
 @router.get("/sessions/{session_id}/feedback.csv", response_class=Response, responses=_CSV)
 def read_feedback_table(
-    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> Response:
-    """Every stride of the live take with its cue; without feedback only the header."""
-    view = feedback.view(reviewed, _opened(db, trail, who, session_id))
+    """All strides of the live trial with their cues; without feedback only the header."""
+    view = feedback.view(reviewed, _opened(db, trail, user, session_id))
     return attachment(feedback_csv(view), f"feedback-{session_id[:8]}.csv")
 
 
-def _opened(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> feedback.FeedbackRecords:
+def _opened(db: Database, trail: AuditTrail, user: Identity, session_id: str) -> feedback.FeedbackRecords:
     with db.read() as c:
         patient = patients.get(c, sessions.get(c, session_id).patient_id)
-        found = feedback.gather(c, patient, session_id, histories.list_analysed(c, patient.id))
-    trail.record_opened(who, "feedback.opened", "session", session_id)
-    return found
+        records = feedback.gather(c, patient, session_id, histories.list_analysed(c, patient.id))
+    trail.record_opened(user, "feedback.opened", "session", session_id)
+    return records
 
 
 def _shown(written: PatientPrescription) -> dict[str, Any]:
-    said = [f"{label}: {text}" for label, text in prescription_words(written.content)]
-    return {**vars(written), "content": written.content.to_json(), "words": said}
+    lines = [f"{label}: {text}" for label, text in prescription_words(written.content)]
+    return {**vars(written), "content": written.content.to_json(), "words": lines}

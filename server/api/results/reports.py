@@ -1,4 +1,4 @@
-"""The report of a session's analysis: everything its pages show, as JSON and as tables."""
+"""Report of a session's analysis, complete as JSON and in parts as tables."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 @router.get("/report", response_model=schemas.ReportAnswer)
 def read_report(
-    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> dict[str, object]:
-    """Quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
-    return _opened(db, reviewed, trail, who, session_id).to_json()
+    """Data quality, parameters with norms, cycle curves with norm bands, strides, provenance."""
+    return _opened(db, reviewed, trail, user, session_id).to_json()
 
 
 @router.get("/parameters.csv", response_class=Response, responses=_CSV)
-def read_parameters(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """The table of parameters, left and right, with the norm."""
-    report = _opened(db, reviewed, trail, who, session_id)
+def read_parameters(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader) -> Response:
+    """Table of parameters, left and right, with norms."""
+    report = _opened(db, reviewed, trail, user, session_id)
     return attachment(parameters_csv(report), f"parameters-{session_id[:8]}.csv")
 
 
@@ -50,36 +50,36 @@ def read_parameter(
     db: Db,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Reader,
+    user: Reader,
 ) -> dict[str, object]:
-    """One parameter with its definition and the value of every stride, counted or not."""
+    """One parameter with its definition and the value of every stride, included or not."""
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
-        found = analyses.get_shown(c, session_id)
-        edits = edit_log.edits_of(c, found.id)
-        known = controls.list_visits(c, patient, session)
-    trail.record_opened(who, "parameter.opened", "session", session_id, {"parameter": name})
-    return reports.behind_number(reviewed, found, edits, patient, session, name, known).to_json()
+        record = analyses.get_shown(c, session_id)
+        edits = edit_log.edits_of(c, record.id)
+        control_visits = controls.list_visits(c, patient, session)
+    trail.record_opened(user, "parameter.opened", "session", session_id, {"parameter": name})
+    return reports.behind_number(reviewed, record, edits, patient, session, name, control_visits).to_json()
 
 
 @router.get("/curves.csv", response_class=Response, responses=_CSV)
-def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """The cycle curves: mean and spread by side and per cent of the cycle, with the norm."""
+def read_curves(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader) -> Response:
+    """Cycle curves: mean and spread by side and percentage of the cycle, with norms."""
     return attachment(
-        curves_csv(_opened(db, reviewed, trail, who, session_id)), f"curves-{session_id[:8]}.csv"
+        curves_csv(_opened(db, reviewed, trail, user, session_id)), f"curves-{session_id[:8]}.csv"
     )
 
 
 def _opened(
-    db: Database, reviewed: ReviewedAnalyses, trail: AuditTrail, who: Identity, session_id: str
+    db: Database, reviewed: ReviewedAnalyses, trail: AuditTrail, user: Identity, session_id: str
 ) -> ReportModel:
     with db.read() as c:
         session = sessions.get(c, session_id)
         patient = patients.get(c, session.patient_id)
-        found = analyses.get_shown(c, session_id)
-        edits = edit_log.edits_of(c, found.id)
-        before = comparisons.find_previous(c, session, histories.list_analysed(c, patient.id))
-        known = controls.list_visits(c, patient, session)
-    trail.record_opened(who, "report.opened", "session", session_id, {"analysis_id": found.id})
-    return reports.read(reviewed, found, edits, patient, session, before, known)[1]
+        record = analyses.get_shown(c, session_id)
+        edits = edit_log.edits_of(c, record.id)
+        previous = comparisons.find_previous(c, session, histories.list_analysed(c, patient.id))
+        control_visits = controls.list_visits(c, patient, session)
+    trail.record_opened(user, "report.opened", "session", session_id, {"analysis_id": record.id})
+    return reports.read(reviewed, record, edits, patient, session, previous, control_visits)[1]

@@ -1,4 +1,4 @@
-"""What goes over the wire about a review: edits, events and strides as they count, signals."""
+"""Schemas of reviews: edits, current events and strides, signals."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AnySeconds = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False, descri
 
 
 class EditNew(Request):
-    """A change of an event (move, add, delete) or a decision about a stride (exclude, include)."""
+    """A change of an event (move, add, delete) or the exclusion or inclusion of a stride."""
 
     kind: Literal["move_event", "add_event", "delete_event", "exclude_stride", "include_stride"]
     side: Literal["left", "right"]
@@ -29,7 +29,7 @@ class EditNew(Request):
 
 @dataclass(frozen=True)
 class EditAnswer:
-    """An edit that counts, by whom and when."""
+    """An edit in effect, with author and time."""
 
     seq: int
     by: str | None
@@ -46,8 +46,8 @@ class EditAnswer:
 class Event:
     """A contact (ic) or foot-off (tc); its source is a detector, "consensus", or "manual".
 
-    `confidence` is the share of the detectors that found it, null when there was one; `uncertainty_s` the
-    standard uncertainty of its time, null where a person placed it.
+    `confidence` is the fraction of detectors that found it, null with only one; `uncertainty_s` is the
+    standard uncertainty of its time, null if placed manually.
     """
 
     side: str
@@ -60,7 +60,7 @@ class Event:
 
 @dataclass(frozen=True)
 class ReviewedStride:
-    """A stride: what the rules found about it, and whether and why it is left out."""
+    """A stride with the findings of the rules, and whether and why it is excluded."""
 
     side: str
     start_s: float
@@ -73,9 +73,9 @@ class ReviewedStride:
 
 @dataclass(frozen=True)
 class Review:
-    """Events, strides and parameters of an analysis as they count now.
+    """Current events, strides and parameters of an analysis.
 
-    `version` grows with every change; `redoable` is the number of undone edits that can be made again.
+    `version` increases with every change; `redoable` is the number of undone edits that can be redone.
     """
 
     analysis_id: str

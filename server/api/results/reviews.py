@@ -1,4 +1,4 @@
-"""Review of a session's analysis: events and strides as they count, edits, undo, redo, their signals."""
+"""Review of a session's analysis: current events and strides, edits, undo, redo, signals."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from starlette.responses import Response
 
 from sagittal.core.events.edits import read_edit
 from sagittal.core.events.result import list_known
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
 from sagittal.server.api.results import review_schemas as schemas
@@ -28,7 +29,6 @@ from sagittal.server.results import analyses, edit_log, reviews, signals
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.storage.db import Database
 from sagittal.server.trail import AuditTrail
-from sagittal.web.user_text import encode_user_text
 
 router = APIRouter(route_class=StrictJsonRoute, prefix="/sessions/{session_id}", tags=["review"])
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
@@ -45,48 +45,48 @@ _CSV: dict[int | str, dict[str, Any]] = {
 
 
 @router.get("/edits", response_model=None, responses=_REVIEW)
-def read_review(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Events, strides and parameters as they count now, and the edits that made them so."""
-    return _review(reviewed, *_opened(db, trail, who, session_id, "review"))
+def read_review(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader) -> Response:
+    """Current events, strides and parameters, and the edits applied."""
+    return _review(reviewed, *_opened(db, trail, user, session_id, "review"))
 
 
 @router.post("/edits", status_code=201, response_model=None, responses=_MADE)
 def make_edit(
-    session_id: Id, body: schemas.EditNew, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None
+    session_id: Id, body: schemas.EditNew, db: Db, reviewed: Reviewed, user: Reviewer, seen: Seen = None
 ) -> Response:
-    """Move, add or delete an event, leave a stride out or count it; everything is measured again."""
+    """Move, add or delete an event, or exclude or include a stride; parameters are recomputed."""
     edit = read_edit(body.model_dump(exclude_none=True))
-    found, edits = reviews.make(db, reviewed, who, session_id, edit, seen=seen)
-    return _review(reviewed, found, edits, 201)
+    record, edits = reviews.make(db, reviewed, user, session_id, edit, base_version=seen)
+    return _review(reviewed, record, edits, 201)
 
 
 @router.delete("/edits", response_model=None, responses=_REVIEW | refusals(409))
-def undo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
-    """Undo the last edit that is not undone yet."""
-    return _review(reviewed, *reviews.undo(db, who, session_id, seen=seen))
+def undo_edit(session_id: Id, db: Db, reviewed: Reviewed, user: Reviewer, seen: Seen = None) -> Response:
+    """Undo the latest edit."""
+    return _review(reviewed, *reviews.undo(db, user, session_id, base_version=seen))
 
 
 @router.post("/edits/redo", response_model=None, responses=_REVIEW | refusals(409))
-def redo_edit(session_id: Id, db: Db, reviewed: Reviewed, who: Reviewer, seen: Seen = None) -> Response:
-    """Make the edit again that was undone last; a new edit ends what can be redone."""
-    return _review(reviewed, *reviews.redo(db, reviewed, who, session_id, seen=seen))
+def redo_edit(session_id: Id, db: Db, reviewed: Reviewed, user: Reviewer, seen: Seen = None) -> Response:
+    """Redo the edit that was undone last; a new edit clears the redo history."""
+    return _review(reviewed, *reviews.redo(db, reviewed, user, session_id, base_version=seen))
 
 
 @router.get("/events.csv", response_class=Response, responses=_CSV)
-def read_events(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Contacts and foot-offs as they count, edited ones with the source "manual"."""
-    found, edits = _opened(db, trail, who, session_id, "events")
-    events = reviewed.read_bundle(found, edits).events
+def read_events(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader) -> Response:
+    """Current contacts and foot-offs as a table; edited ones have the source "manual"."""
+    record, edits = _opened(db, trail, user, session_id, "events")
+    events = reviewed.read_bundle(record, edits).events
     return attachment(events_csv(events), f"events-{session_id[:8]}.csv")
 
 
 @router.get("/strides.csv", response_class=Response, responses=_CSV)
-def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader) -> Response:
-    """Every stride with its parameters, as it counts."""
-    found, edits = _opened(db, trail, who, session_id, "strides")
-    result = reviewed.measure(found, edits)
+def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader) -> Response:
+    """Current strides with their parameters as a table."""
+    record, edits = _opened(db, trail, user, session_id, "strides")
+    result = reviewed.measure(record, edits)
     content = (
-        analyses.file_bytes(reviewed.blobs, found, "strides.csv")
+        analyses.file_bytes(reviewed.blobs, record, "strides.csv")
         if result is None
         else strides_csv(result.strides, result.columns)
     )
@@ -95,11 +95,11 @@ def read_strides(session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, w
 
 @router.get("/signals", response_model=list[signals.SignalLane])
 def list_signals(
-    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, reviewed: Reviewed, trail: OpenTrail, user: Reader
 ) -> tuple[signals.SignalLane, ...]:
-    """Which signals there are: derived ones of feet and joints, raw ones of every sensor."""
-    found = _watched(db, trail, who, session_id)
-    return signals.list_lanes(reviewed, found)
+    """List available signals: derived ones of feet and joints, raw ones of every sensor."""
+    record = _watched(db, trail, user, session_id)
+    return signals.list_lanes(reviewed, record)
 
 
 @router.get("/signals/{name}", response_model=None, responses={200: {"model": signals.SignalWindow}})
@@ -109,45 +109,53 @@ def read_signal(
     db: Db,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Reader,
+    user: Reader,
     start_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 0.0,
     end_s: Annotated[float, Query(ge=0, le=1e6, allow_inf_nan=False)] = 1e6,
     points: Annotated[int, Query(ge=1, le=signals.MOST_POINTS)] = 1000,
 ) -> Response:
-    """A window of a signal in at most so many parts, the least and the greatest value of each."""
-    found = _watched(db, trail, who, session_id)
-    return JSONResponse(asdict(signals.read_window(reviewed, found, name, start_s, end_s, points)))
+    """A window of a signal, downsampled to minimum and maximum per bin."""
+    record = _watched(db, trail, user, session_id)
+    return JSONResponse(asdict(signals.read_window(reviewed, record, name, start_s, end_s, points)))
 
 
-def _watched(db: Database, trail: AuditTrail, who: Identity, session_id: str) -> analyses.AnalysisRecord:
-    """Signals are asked for at every zoom and step."""
+def _watched(db: Database, trail: AuditTrail, user: Identity, session_id: str) -> analyses.AnalysisRecord:
+    """Record access once, since signals are requested at every zoom step."""
     with db.read() as c:
-        found = analyses.get_shown(c, session_id)
-    trail.record_watched(who, "signals.opened", "session", session_id, {"analysis_id": found.id})
-    return found
+        record = analyses.get_shown(c, session_id)
+    trail.record_watched(user, "signals.opened", "session", session_id, {"analysis_id": record.id})
+    return record
 
 
 def _opened(
-    db: Database, trail: AuditTrail, who: Identity, session_id: str, what: str
+    db: Database, trail: AuditTrail, user: Identity, session_id: str, resource: str
 ) -> tuple[analyses.AnalysisRecord, edit_log.EditHistory]:
     with db.read() as c:
-        found = analyses.get_shown(c, session_id)
-        edits = edit_log.edits_of(c, found.id)
-    trail.record_opened(who, f"{what}.opened", "session", session_id, {"analysis_id": found.id})
-    return found, edits
+        record = analyses.get_shown(c, session_id)
+        edits = edit_log.edits_of(c, record.id)
+    trail.record_opened(user, f"{resource}.opened", "session", session_id, {"analysis_id": record.id})
+    return record, edits
 
 
 def _review(
-    reviewed: ReviewedAnalyses, found: analyses.AnalysisRecord, edits: edit_log.EditHistory, status: int = 200
+    reviewed: ReviewedAnalyses,
+    record: analyses.AnalysisRecord,
+    edits: edit_log.EditHistory,
+    status: int = 200,
 ) -> Response:
-    """Written without a model: two thousand events would be checked longer than they are measured."""
-    bundle = reviewed.read_bundle(found, edits)
-    events, strides, of = bundle.events.events, bundle.strides.strides, bundle.strides.columns
+    """Response without model validation, which would take longer for two thousand events than
+    computing them.
+    """
+    bundle = reviewed.read_bundle(record, edits)
+    events, strides, stride_columns = bundle.events.events, bundle.strides.strides, bundle.strides.columns
     times = np.round(np.array([e.time_s for e in events], np.float64), 6).tolist()
-    starts, offs, ends = (list_known(np.round(x, 6)) for x in (of.start_s, of.tc_s, of.end_s))
+    starts, offs, ends = (
+        list_known(np.round(x, 6))
+        for x in (stride_columns.start_s, stride_columns.tc_s, stride_columns.end_s)
+    )
     content = {
-        "analysis_id": found.id,
-        "editable": reviewed.open(found).tracks is not None,
+        "analysis_id": record.id,
+        "editable": reviewed.open(record).tracks is not None,
         "version": edits.version,
         "redoable": len(edits.undone),
         "edits": [{"seq": m.seq, "by": m.by, "at": m.at.isoformat(), **m.edit.to_json()} for m in edits.made],

@@ -1,4 +1,4 @@
-"""Sensitivity analyses of squats: asked for, listed, read."""
+"""Sensitivity analyses of squats: request, list, read."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 class SensitivityNew(schemas.Request):
-    """What the angles are held against, and which zero they have."""
+    """Reference and zero of the angles."""
 
     reference: Annotated[
         str | None,
@@ -54,34 +54,34 @@ def start(
     body: SensitivityNew,
     db: Db,
     queue: Queue,
-    who: Annotated[Identity, require(Action.ANALYSE)],
+    user: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Put each of 24 measures of body and sensors off, one at a time, and see how far the angles move."""
+    """Perturb each of 24 body and sensor parameters in turn, and compute the change of the angles."""
     with db.write() as c:
         return sensitivities.submit(
-            c, queue, who, session_id, reference=body.reference, from_standing=body.from_standing
+            c, queue, user, session_id, reference=body.reference, from_standing=body.from_standing
         )
 
 
 @router.get("/sessions/{session_id}/sensitivities", response_model=list[sensitivities.StoredSensitivity])
 def list_sensitivities(
-    session_id: Id, db: Db, trail: OpenTrail, who: Reader
+    session_id: Id, db: Db, trail: OpenTrail, user: Reader
 ) -> list[sensitivities.StoredSensitivity]:
-    """The finished sensitivity analyses of a session, the newest first."""
+    """List finished sensitivity analyses of a session, newest first."""
     with db.read() as c:
-        found = sensitivities.of_session(c, session_id)
-    trail.record_watched(who, "sensitivities.opened", "session", session_id)
-    return found
+        rows = sensitivities.of_session(c, session_id)
+    trail.record_watched(user, "sensitivities.opened", "session", session_id)
+    return rows
 
 
 @router.get("/sensitivities/{sensitivity_id}", response_model=SensitivityResult)
 def read_sensitivity(
-    sensitivity_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+    sensitivity_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, user: Reader
 ) -> SensitivityResult:
-    """One with its tables; `id` is that of the job. The CSV is among the files of the analysis."""
+    """One analysis with its tables; `id` is that of the job. The CSV is among the files of the analysis."""
     with db.read() as c:
-        found = sensitivities.get(c, sensitivity_id)
-        analysis, name = sensitivities.find_file(c, found)
+        row = sensitivities.get(c, sensitivity_id)
+        analysis, name = sensitivities.find_file(c, row)
     content = analyses.file_bytes(blobs, analysis, name)
-    trail.record_opened(who, "sensitivity.opened", "sensitivity", sensitivity_id)
-    return SensitivityResult(found, json.loads(content))
+    trail.record_opened(user, "sensitivity.opened", "sensitivity", sensitivity_id)
+    return SensitivityResult(row, json.loads(content))

@@ -1,4 +1,4 @@
-"""What goes over the wire about visits compared with each other."""
+"""Schemas of comparisons between visits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagittal.server.report.history.trends import TrendPoint
 
 @dataclass(frozen=True)
 class Condition:
-    """How a take was walked, and the same in words; null = not stated, of a belt not entered."""
+    """Walking condition, as codes and in words; null = not recorded, or treadmill speed unknown."""
 
     protocol: str
     belt_speed_mps: float | None
@@ -27,7 +27,7 @@ class Condition:
 
 @dataclass(frozen=True)
 class TrendVisit:
-    """An analysed visit; `label` of the programme's plan, null outside one. With feedback: a training."""
+    """An analysed visit; `label` from the programme's plan, null outside one. With feedback: a training."""
 
     session_id: str
     performed_on: dt.date
@@ -39,7 +39,9 @@ class TrendVisit:
 
 @dataclass(frozen=True)
 class OtherWalksAnswer:
-    """Visits walked otherwise: how many, and the newest of them, to be asked for with `like`."""
+    """Visits with a different walking condition: their number, and the latest, to be requested with
+    `like`.
+    """
 
     condition: Condition
     count: int
@@ -48,7 +50,7 @@ class OtherWalksAnswer:
 
 @dataclass(frozen=True)
 class TrendLine:
-    """One side; `base` and `latest` are indices of the first and the last assessment, null without one."""
+    """One side; `base` and `latest` are indices of the first and last assessment, null without one."""
 
     side: str | None
     mdc: float | None
@@ -61,7 +63,7 @@ class TrendLine:
 
 @dataclass(frozen=True)
 class TrendAnswer:
-    """A figure over the visits, with the norm of people like this one."""
+    """A parameter over the visits, with the norm for comparable subjects."""
 
     name: str
     title: str
@@ -72,7 +74,7 @@ class TrendAnswer:
 
 @dataclass(frozen=True)
 class Trends:
-    """Figures over the visits walked under one condition."""
+    """Parameters over the visits with the same walking condition."""
 
     protocol: str | None
     condition: Condition | None
@@ -95,16 +97,16 @@ class ComparedSession:
 
 @dataclass(frozen=True)
 class ChangeInWords(Change):
-    """A change and its verdict as the pages say it."""
+    """A change and its assessment as shown on the pages."""
 
     words: str
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two sessions, the earlier one first; `cautions` say how walks and measurements themselves differ.
+    """Two sessions, the earlier one first; `cautions` list differences in condition and measurement.
 
-    `comparable` false: they were not walked alike, or with feedback, and no change has a verdict.
+    `comparable` false: the walking conditions differ or feedback was given, so changes are not assessed.
     """
 
     before: ComparedSession

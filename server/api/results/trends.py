@@ -1,4 +1,4 @@
-"""Figures over the visits of a patient: what changed since the first assessment, and how sure that is."""
+"""Parameters over the visits of a patient: changes since the first assessment and their certainty."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _follow(
     db: Db,
     reviewed: Reviewed,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     show: Names,
     protocol: Walked = None,
     like: Like = None,
@@ -62,11 +62,13 @@ def _follow(
     with db.read() as c:
         patient = patients.get(c, patient_id)
         done, plans = histories.read(c, patient)
-    trail.record_opened(who, "trends.opened", "patient", patient_id)
-    known = histories.read_history(reviewed, patient, done, plans, protocol, like)
-    there = names_in(known.visits)
-    wanted = [n for n in show if n in there] if show else there
-    return known, follow_figures(known.visits, wanted, known.norms, known.usual, known.patient.affected_side)
+    trail.record_opened(user, "trends.opened", "patient", patient_id)
+    history = histories.read_history(reviewed, patient, done, plans, protocol, like)
+    available = names_in(history.visits)
+    names = [n for n in show if n in available] if show else available
+    return history, follow_figures(
+        history.visits, names, history.norms, history.usual, history.patient.affected_side
+    )
 
 
 Followed = Annotated[tuple[PatientHistory, tuple[Trend, ...]], Depends(_follow)]
@@ -75,8 +77,8 @@ Followed = Annotated[tuple[PatientHistory, tuple[Trend, ...]], Depends(_follow)]
 
 @router.get("/trends", response_model=None, responses=_JSON)
 def read_trends(followed: Followed) -> Response:
-    """Values by visit with the norm, and the change since the first assessment against MDC and MCID."""
-    known, found = followed
+    """Values by visit with norms, and changes since the first assessment against MDC and MCID."""
+    history, trends = followed
     visits = [
         {
             "session_id": v.session_id,
@@ -86,24 +88,24 @@ def read_trends(followed: Followed) -> Response:
             "kind": v.kind,
             "condition": _condition(v.condition),
         }
-        for v in known.visits
+        for v in history.visits
     ]
-    walked = known.condition
+    walked = history.condition
     content = {
         "protocol": None if walked is None else walked.protocol,
         "condition": None if walked is None else _condition(walked),
         "visits": visits,
-        "others": [{**vars(o), "condition": _condition(o.condition)} for o in known.others],
-        "trends": [_trend(t) for t in found],
+        "others": [{**vars(o), "condition": _condition(o.condition)} for o in history.others],
+        "trends": [_trend(t) for t in trends],
     }
     return JSONResponse(reduce_to_plain(content))
 
 
 @router.get("/trends.csv", response_class=Response, responses=_CSV)
 def read_trends_table(patient_id: Id, followed: Followed) -> Response:
-    """The same as a table: one row per figure, side and visit."""
-    known, found = followed
-    return attachment(trends_csv(known.visits, found), f"trends-{patient_id[:8]}.csv")
+    """The trends as a table: one row per parameter, side and visit."""
+    history, trends = followed
+    return attachment(trends_csv(history.visits, trends), f"trends-{patient_id[:8]}.csv")
 
 
 def _condition(walked: WalkingCondition) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Tunings of filters on trials with a reference: asked for, listed, downloaded."""
+"""Tuning of filters on trials with a reference: request, list, download."""
 
 from __future__ import annotations
 
@@ -28,27 +28,27 @@ def tune(
     body: schemas.TuningNew,
     db: Db,
     queue: Queue,
-    who: Annotated[Identity, require(Action.ANALYSE)],
+    user: Annotated[Identity, require(Action.ANALYSE)],
 ) -> JobView:
-    """Fit the gains of a filter to the trials (.npz) among the session's files; analyses go before it."""
+    """Fit the gains of a filter to the trials (.npz) among the session's files; analyses have priority."""
     order = tunings.TuningOrder(**body.model_dump())
     with db.write() as c:
-        return tunings.submit(c, queue, who, session_id, order)
+        return tunings.submit(c, queue, user, session_id, order)
 
 
 @router.get("/sessions/{session_id}/tunings", response_model=list[tunings.StoredTuning])
-def list_tunings(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[tunings.StoredTuning]:
-    """The finished tunings of a session, the newest first."""
+def list_tunings(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[tunings.StoredTuning]:
+    """List finished tunings of a session, newest first."""
     with db.read() as c:
-        made = tunings.of_session(c, session_id)
-    trail.record_watched(who, "tunings.opened", "session", session_id)
-    return made
+        rows = tunings.of_session(c, session_id)
+    trail.record_watched(user, "tunings.opened", "session", session_id)
+    return rows
 
 
 @router.get("/tunings/{tuning_id}", response_model=tunings.StoredTuning)
-def read_tuning(tuning_id: Id, db: Db, trail: OpenTrail, who: Reader) -> tunings.StoredTuning:
+def read_tuning(tuning_id: Id, db: Db, trail: OpenTrail, user: Reader) -> tunings.StoredTuning:
     """One tuning: gains, errors before and after on both halves, the sha256 of the data, and the verdict."""
     with db.read() as c:
-        found = tunings.get(c, tuning_id)
-    trail.record_opened(who, "tuning.opened", "tuning", tuning_id)
-    return found
+        row = tunings.get(c, tuning_id)
+    trail.record_opened(user, "tuning.opened", "tuning", tuning_id)
+    return row

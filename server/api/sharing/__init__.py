@@ -1,1 +1,1 @@
-"""Routes of signed reports and who may read them."""
+"""Routes for signed reports and access to them."""

@@ -1,4 +1,4 @@
-"""Care teams: who may open which patient, and opening one in an emergency."""
+"""Care teams and emergency access to patients."""
 
 from __future__ import annotations
 
@@ -22,40 +22,40 @@ Admin = Annotated[Identity, require(Action.MANAGE_USERS)]
 
 
 @router.get("/care-teams", response_model=schemas.CareTeams)
-def read_option(db: Db, who: Admin) -> schemas.CareTeams:
+def read_option(db: Db, user: Admin) -> schemas.CareTeams:
     """Whether the clinic has care teams."""
     with db.read() as c:
         return schemas.CareTeams(on=care_teams.are_on(c))
 
 
 @router.put("/care-teams", response_model=schemas.CareTeams)
-def switch(body: schemas.CareTeamsSwitch, db: Db, who: Admin) -> schemas.CareTeams:
-    """Let the team alone see a patient, or everybody again; the teams are kept meanwhile."""
+def switch(body: schemas.CareTeamsSwitch, db: Db, user: Admin) -> schemas.CareTeams:
+    """Restrict patients to their care team, or lift the restriction; teams are retained."""
     with db.write() as c:
         if body.on:
-            care_teams.switch_on(c, who, begin_with_past=body.begin_with_past)
+            care_teams.switch_on(c, user, begin_with_past=body.begin_with_past)
         else:
-            care_teams.switch_off(c, who)
+            care_teams.switch_off(c, user)
         return schemas.CareTeams(on=care_teams.are_on(c))
 
 
 @router.get("/patients/{patient_id}/care-team", response_model=schemas.CareTeam)
 def read_team(
-    patient_id: Id, db: Db, trail: OpenTrail, who: Annotated[Identity, require(Action.READ_PATIENT)]
+    patient_id: Id, db: Db, trail: OpenTrail, user: Annotated[Identity, require(Action.READ_PATIENT)]
 ) -> schemas.CareTeam:
-    """Who is in the team of a patient, and who opened the patient in an emergency of late."""
+    """Care team of a patient, and recent emergency access to the patient."""
     with db.read() as c:
         patients.get(c, patient_id)
-        found = schemas.CareTeam(care_teams.list_team(c, patient_id), care_teams.list_accesses(c, patient_id))
-    trail.record_opened(who, "care_team.opened", "patient", patient_id)
-    return found
+        team = schemas.CareTeam(care_teams.list_team(c, patient_id), care_teams.list_accesses(c, patient_id))
+    trail.record_opened(user, "care_team.opened", "patient", patient_id)
+    return team
 
 
 @router.put("/patients/{patient_id}/care-team", response_model=schemas.CareTeam)
-def set_team(patient_id: Id, body: schemas.CareTeamChange, db: Db, who: Admin) -> schemas.CareTeam:
-    """Say who is in the team of a patient, by ids of accounts; all others leave it."""
+def set_team(patient_id: Id, body: schemas.CareTeamChange, db: Db, user: Admin) -> schemas.CareTeam:
+    """Set the care team of a patient by account ids; all others leave it."""
     with db.write() as c:
-        team = care_teams.set_team(c, who, patient_id, body.users)
+        team = care_teams.set_team(c, user, patient_id, body.users)
         return schemas.CareTeam(team, care_teams.list_accesses(c, patient_id))
 
 
@@ -71,18 +71,18 @@ def open_in_emergency(
     db: Db,
     trail: OpenTrail,
     failures: Failures,
-    who: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)],
+    user: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)],
 ) -> care_teams.EmergencyAccess:
-    """Open a patient whose exact code is known, for four hours; the team and the administrators see it."""
+    """Open a patient with a known exact code for four hours; team and administrators can see the access."""
     # counted, so that nobody looks for people by guessing codes; by a key of its own, so that failed sign-ins
     # at the clinic's one address do not close this door, nor wrong codes the sign-in
-    account, address = f"emergency of {who.user_id}", f"emergency {address_of(request)}"
+    account, address = f"emergency of {user.user_id}", f"emergency {address_of(request)}"
     attempt = failures.begin(account, address)
     try:
         with db.write() as c:
-            opened = care_teams.open_in_emergency(c, who, body.code, body.reason)
+            opened = care_teams.open_in_emergency(c, user, body.code, body.reason)
     except NotFound:
-        trail.record_opened(who, "emergency.refused", "patient", None)
+        trail.record_opened(user, "emergency.refused", "patient", None)
         raise
     except BaseException:
         failures.withdraw(account, address, attempt)
@@ -93,8 +93,8 @@ def open_in_emergency(
 
 @router.post("/emergency-accesses/{access_id}/end", response_model=care_teams.EmergencyAccess)
 def end_emergency(
-    access_id: Id, db: Db, who: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)]
+    access_id: Id, db: Db, user: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)]
 ) -> care_teams.EmergencyAccess:
-    """End one's own access in an emergency now, as administrator anybody's; links made in it end too."""
+    """End one's own emergency access, or any as administrator; links created during it end too."""
     with db.write() as c:
-        return care_teams.end_emergency(c, who, access_id)
+        return care_teams.end_emergency(c, user, access_id)

@@ -1,4 +1,4 @@
-"""The therapist's text on a report, the versions that were signed, and the links to them."""
+"""Assessment text of a report, signed versions, and links to them."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ Signer = Annotated[Identity, require(Action.SIGN_REPORT)]
 
 @dataclass(frozen=True)
 class NewReportLink:
-    """A link that was just made: its address is told this once.
+    """A newly created link; its URL is shown only once.
 
     Parameters
     ----------
-    url : for whoever is to read the report. qr : the same as a picture, an address `data:image/svg+xml`.
+    url : for the recipient. qr : QR code of it as a data URL, `data:image/svg+xml`.
     """
 
     link: ReportLink
@@ -40,37 +40,37 @@ class NewReportLink:
 
 
 @router.put("/sessions/{session_id}/assessment", status_code=204, responses=refusals(409))
-def write_assessment(session_id: Id, body: schemas.Assessment, db: Db, who: Signer) -> None:
-    """Write the therapist's text on the report; empty = none."""
+def write_assessment(session_id: Id, body: schemas.Assessment, db: Db, user: Signer) -> None:
+    """Set the therapist's assessment on the report; empty = none."""
     with db.write() as c:
-        signed_reports.write_assessment(c, who, session_id, body.content or "")
+        signed_reports.write_assessment(c, user, session_id, body.content or "")
 
 
 @router.get("/sessions/{session_id}/signed-reports", response_model=list[SignedReport])
-def list_signed(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[SignedReport]:
-    """All versions that were signed, the newest first."""
+def list_signed(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[SignedReport]:
+    """List all signed versions, newest first."""
     with db.read() as c:
         sessions.get(c, session_id)
-        found = signed_reports.of_session(c, session_id)
-    trail.record_opened(who, "signed_reports.opened", "session", session_id)
-    return found
+        rows = signed_reports.of_session(c, session_id)
+    trail.record_opened(user, "signed_reports.opened", "session", session_id)
+    return rows
 
 
 @router.post("/signed-reports/{report_id}/reopen", response_model=SignedReport, responses=refusals(409))
-def reopen(report_id: Id, body: schemas.Reopening, db: Db, who: Signer) -> SignedReport:
-    """Take a signed report out of force with a reason, and end its links; it stays and can be read."""
+def reopen(report_id: Id, body: schemas.Reopening, db: Db, user: Signer) -> SignedReport:
+    """Reopen a signed report with a reason, and end its links; the version remains readable."""
     with db.write() as c:
-        return report_links.reopen_report(c, who, report_id, body.reason, who.display_name)
+        return report_links.reopen_report(c, user, report_id, body.reason, user.display_name)
 
 
 @router.get("/sessions/{session_id}/report-links", response_model=list[ReportLink])
-def list_links(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[ReportLink]:
-    """The links to the signed reports of a session, the newest first; their addresses are not known."""
+def list_links(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> list[ReportLink]:
+    """List links to the signed reports of a session, newest first, without their URLs."""
     with db.read() as c:
         sessions.get(c, session_id)
-        found = report_links.of_session(c, session_id)
-    trail.record_opened(who, "signed_reports.opened", "session", session_id)
-    return found
+        rows = report_links.of_session(c, session_id)
+    trail.record_opened(user, "signed_reports.opened", "session", session_id)
+    return rows
 
 
 @router.post(
@@ -80,17 +80,17 @@ def list_links(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> list[Re
     responses=refusals(409),
 )
 def make_link(
-    report_id: Id, body: schemas.ReportLinkNew, request: Request, db: Db, who: Signer
+    report_id: Id, body: schemas.ReportLinkNew, request: Request, db: Db, user: Signer
 ) -> NewReportLink:
-    """Make a link by which somebody without an account reads this report, without the patient's code."""
+    """Create a link to this report, without the patient's code, for a reader without an account."""
     with db.write() as c:
-        link, token = report_links.make(c, who, report_id, body.days, who.display_name)
+        link, token = report_links.make(c, user, report_id, body.days, user.display_name)
     url = f"{request.base_url}r/{token}"
     return NewReportLink(link, url, segno.make(url, micro=False).svg_data_uri(scale=4, border=2))
 
 
 @router.delete("/report-links/{link_id}", response_model=ReportLink)
-def revoke_link(link_id: Id, db: Db, who: Signer) -> ReportLink:
-    """End a link now."""
+def revoke_link(link_id: Id, db: Db, user: Signer) -> ReportLink:
+    """End a link immediately."""
     with db.write() as c:
-        return report_links.revoke(c, who, link_id)
+        return report_links.revoke(c, user, link_id)

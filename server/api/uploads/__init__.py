@@ -1,1 +1,1 @@
-"""Routes of uploads."""
+"""Routes for uploads."""

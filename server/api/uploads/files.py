@@ -1,4 +1,4 @@
-"""Original files of a session: streamed in with constant memory, kept byte for byte, streamed out."""
+"""Original files of a session: streamed in constant memory and stored byte for byte."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ async def put_file(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
-    """Add a file to the current recording, the raw body as its content; the same name replaces it."""
+    """Add a file with the raw body as its content to the current recording; the same name replaces it."""
     size = read_size(request, settings.max_file_bytes)
-    upload = await run_in_threadpool(receiving.receive, db, blobs, settings, who, session_id, name, size)
+    upload = await run_in_threadpool(receiving.receive, db, blobs, settings, user, session_id, name, size)
     return await receive_body(request, upload)
 
 
@@ -77,9 +77,9 @@ async def post_files(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> list[recordings.RecordedFile]:
-    """Add files from a form with the field `files`; a file that is refused ends the request."""
+    """Add files from a form with the field `files`; a rejected file ends the request."""
     if "content-length" not in request.headers:
         raise Problem(
             411, "length_required", "A form upload must say its length. Send a Content-Length header."
@@ -106,7 +106,7 @@ async def post_files(
         stored = []
         for part in parts:
             upload = await run_in_threadpool(
-                receiving.receive, db, blobs, settings, who, session_id, part.filename or ""
+                receiving.receive, db, blobs, settings, user, session_id, part.filename or ""
             )
             with upload:
                 while chunk := await part.read(CHUNK_BYTES):
@@ -128,27 +128,27 @@ def read_file(
     db: Db,
     blobs: Blobs,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """Download an original file, byte for byte."""
     with db.read() as c:
         recording = recordings.require_current(c, session_id)
         content = recordings.file_bytes(c, blobs, recording.id, name)
-    trail.record_opened(who, "recording.file_opened", "recording", recording.id)
+    trail.record_opened(user, "recording.file_opened", "recording", recording.id)
     return attachment(content, name.rpartition("/")[2], "application/octet-stream")
 
 
 @router.delete("/{name:path}", response_model=schemas.RecordingAnswer)
 def delete_file(
-    session_id: Id, name: FileName, db: Db, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, name: FileName, db: Db, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> schemas.RecordingAnswer:
-    """Take a file out of the current recording; analyses already made keep theirs."""
+    """Remove a file from the current recording; existing analyses keep theirs."""
     with db.write() as c:
-        return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, who, session_id, name))
+        return schemas.make_answer(schemas.RecordingAnswer, recordings.remove_file(c, user, session_id, name))
 
 
 async def receive_body(request: Request, upload: receiving.receive) -> recordings.RecordedFile:
-    """Keep the raw body of a request as a file."""
+    """Store the raw body of a request as a file."""
     with upload:
         try:
             async for chunk in read_megabytes(request):
@@ -159,7 +159,7 @@ async def receive_body(request: Request, upload: receiving.receive) -> recording
 
 
 def read_size(request: Request, limit: int) -> int:
-    """Return how many bytes the client announces, 0 = it does not say; raise Problem 413 beyond it."""
+    """Return the announced body size in bytes, 0 = unknown; raise Problem 413 if it exceeds the limit."""
     declared = request.headers.get("content-length", "0")
     if not declared.isdecimal() or int(declared) > limit:
         raise Problem(
@@ -172,7 +172,7 @@ def read_size(request: Request, limit: int) -> int:
 
 
 async def read_megabytes(request: Request) -> AsyncIterator[bytes]:
-    """Yield the raw body of a request in pieces of a megabyte; raises ClientDisconnect."""
+    """Yield the raw body of a request in parts of a megabyte; raises ClientDisconnect."""
     pending = bytearray()
     async for piece in request.stream():
         pending += piece

@@ -1,4 +1,4 @@
-"""Tables of an upload: what they probably hold, whether a reading fits, and how they are to be read."""
+"""Uploaded tables: likely content, check of a mapping, and mapping."""
 
 from __future__ import annotations
 
@@ -28,40 +28,42 @@ Name = Annotated[str, Field(min_length=1, max_length=500)]
 
 
 class TableCheckNew(schemas.Request):
-    """A file and an entry of the manifest's `sources` without `file`; a sensor `*` is called as the file."""
+    """A file and an entry of the manifest's `sources` without `file`; a sensor `*` is named after the
+    file.
+    """
 
     file: Name
     source: schemas.Json
 
 
 class TableMapping(schemas.Request):
-    """Files of one shape and how all of them are read."""
+    """Files of one shape and their common mapping."""
 
     files: Annotated[tuple[Name, ...], Field(min_length=1, max_length=1000)]
     source: schemas.Json
 
 
 @router.get("", response_model=list[TableShape])
-def list_tables(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Uploader) -> list[TableShape]:
-    """The tables of the current recording by their columns, with a guess at what these are."""
+def list_tables(session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, user: Uploader) -> list[TableShape]:
+    """List the tables of the current recording by columns, with their likely content."""
     with db.read() as c:
-        found = tables.list_tables(c, blobs, session_id)
-    trail.record_watched(who, "recording.opened", "session", session_id)
-    return list(found)
+        shapes = tables.list_tables(c, blobs, session_id)
+    trail.record_watched(user, "recording.opened", "session", session_id)
+    return list(shapes)
 
 
 @router.post("/checks", response_model=list[TableReading])
 def check_table(
-    session_id: Id, body: TableCheckNew, db: Db, blobs: Blobs, who: Uploader
+    session_id: Id, body: TableCheckNew, db: Db, blobs: Blobs, user: Uploader
 ) -> list[TableReading]:
-    """What the sensors of a table give at its beginning, read as said; changes nothing."""
+    """Apply a mapping to the beginning of a table and return the sensor values; changes nothing."""
     with db.read() as c:
         return list(tables.check_table(c, blobs, session_id, body.file, body.source))
 
 
 @router.put("", response_model=schemas.RecordingAnswer)
-def map_tables(session_id: Id, body: TableMapping, db: Db, who: Uploader) -> schemas.RecordingAnswer:
-    """Say how tables are read: one entry for each file in the manifest."""
+def map_tables(session_id: Id, body: TableMapping, db: Db, user: Uploader) -> schemas.RecordingAnswer:
+    """Set the mapping of tables: one manifest entry per file."""
     with db.write() as c:
-        found = tables.map_tables(c, who, session_id, body.files, body.source)
-        return schemas.make_answer(schemas.RecordingAnswer, found)
+        shapes = tables.map_tables(c, user, session_id, body.files, body.source)
+        return schemas.make_answer(schemas.RecordingAnswer, shapes)

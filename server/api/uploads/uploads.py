@@ -1,4 +1,4 @@
-"""Large files in parts (docs/reference/api.md, "Large files"): what came stays, and the upload goes on."""
+"""Resumable upload of large files in parts (docs/reference/api.md, "Large files")."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ TELLS = {
 
 
 class UploadAnnouncement(schemas.Request):
-    """A file that will come in parts."""
+    """A file to be uploaded in parts."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=500)]
     size: Annotated[int, Field(ge=1, le=1 << 53, description="bytes")]
 
 
 class UploadEnd(schemas.Request):
-    """What the whole file must be."""
+    """Checksum of the complete file."""
 
     sha256: Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 
@@ -51,10 +51,10 @@ def begin_upload(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> uploads.FileUpload:
-    """Announce a file, or find the unfinished upload of one with this name and size: see its `offset`."""
-    return uploads.begin(db, blobs, settings, who, session_id, body.name, body.size)
+    """Announce a file, or find its unfinished upload by name and size: see its `offset`."""
+    return uploads.begin(db, blobs, settings, user, session_id, body.name, body.size)
 
 
 @router.get("", response_model=list[uploads.FileUpload])
@@ -63,13 +63,13 @@ def list_uploads(
     db: Db,
     blobs: Blobs,
     trail: OpenTrail,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> list[uploads.FileUpload]:
     """List the session's unfinished uploads."""
     with db.read() as c:
         recordings.patient_of(c, session_id)
         coming = uploads.list_coming(c, blobs, session_id)
-    trail.record_opened(who, "uploads.opened", "session", session_id)
+    trail.record_opened(user, "uploads.opened", "session", session_id)
     return coming
 
 
@@ -80,7 +80,7 @@ def list_uploads(
     dependencies=[require(Action.UPLOAD)],
 )
 def tell_offset(session_id: Id, upload_id: Id, db: Db, blobs: Blobs) -> Response:
-    """Tell how many bytes are on the disk; the next part begins there."""
+    """Number of bytes on disk, which is the offset of the next part."""
     with db.read() as c:
         this = uploads.get(c, blobs, session_id, upload_id)
     return Response(headers={"Upload-Offset": str(this.offset), "Upload-Length": str(this.size)})
@@ -102,11 +102,11 @@ async def add_part(
     db: Db,
     blobs: Blobs,
 ) -> uploads.FileUpload:
-    """Add the raw body behind what is there; of a body that breaks off the whole megabytes stay."""
+    """Append the raw body; of an interrupted body, complete megabytes are retained."""
     read_size(request, settings.max_file_bytes)
 
-    def keep(at: int, piece: bytes) -> uploads.FileUpload:
-        return uploads.add_part(db, blobs, settings, session_id, upload_id, at, piece)
+    def keep(offset: int, piece: bytes) -> uploads.FileUpload:
+        return uploads.add_part(db, blobs, settings, session_id, upload_id, offset, piece)
 
     # refused before the first byte is waited for
     this = await run_in_threadpool(keep, offset, b"")
@@ -128,15 +128,15 @@ def finish_upload(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Annotated[Identity, require(Action.UPLOAD)],
+    user: Annotated[Identity, require(Action.UPLOAD)],
 ) -> recordings.RecordedFile:
-    """Check the whole file and add it to the current recording; the same name replaces one."""
-    return uploads.finish(db, blobs, settings, who, session_id, upload_id, body.sha256)
+    """Verify the complete file and add it to the current recording; the same name replaces one."""
+    return uploads.finish(db, blobs, settings, user, session_id, upload_id, body.sha256)
 
 
 @router.delete("/{upload_id}", status_code=204)
 def cancel_upload(
-    session_id: Id, upload_id: Id, db: Db, blobs: Blobs, who: Annotated[Identity, require(Action.UPLOAD)]
+    session_id: Id, upload_id: Id, db: Db, blobs: Blobs, user: Annotated[Identity, require(Action.UPLOAD)]
 ) -> None:
-    """Give up an upload; what came of it goes."""
-    uploads.cancel(db, blobs, who, session_id, upload_id)
+    """Abandon an upload and delete its data."""
+    uploads.cancel(db, blobs, user, session_id, upload_id)

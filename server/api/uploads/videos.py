@@ -1,4 +1,4 @@
-"""The video beside a take."""
+"""Video of a trial."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ Writer = Annotated[Identity, require(Action.WRITE_SESSION)]
 
 
 @router.get("", response_model=videos.SessionVideo)
-def read_video(session_id: Id, db: Db, trail: OpenTrail, who: Reader) -> videos.SessionVideo:
-    """What is known of the video, and who said that the person agreed to be filmed."""
+def read_video(session_id: Id, db: Db, trail: OpenTrail, user: Reader) -> videos.SessionVideo:
+    """Properties of the video, and the user who confirmed the patient's consent."""
     with db.read() as c:
-        found = videos.get(c, session_id)
-    trail.record_watched(who, "video.opened", "session", session_id)
-    return found
+        video = videos.get(c, session_id)
+    trail.record_watched(user, "video.opened", "session", session_id)
+    return video
 
 
 @router.put(
@@ -50,30 +50,30 @@ async def put_video(
     settings: Config,
     db: Db,
     blobs: Blobs,
-    who: Writer,
+    user: Writer,
 ) -> recordings.RecordedFile:
-    """Set a video beside the take, MP4, QuickTime or WebM; it replaces the one before."""
+    """Attach a video to the trial, MP4, QuickTime or WebM; replaces the previous one."""
     size = read_size(request, settings.max_file_bytes)
 
     def begin() -> videos.receive_video:
         videos.require_consent(consent)
-        return videos.receive_video(db, blobs, settings, who, session_id, name, size)
+        return videos.receive_video(db, blobs, settings, user, session_id, name, size)
 
     return await receive_body(request, await run_in_threadpool(begin))
 
 
 @router.patch("", response_model=videos.SessionVideo)
-def align_video(session_id: Id, body: schemas.VideoAlignment, db: Db, who: Writer) -> videos.SessionVideo:
-    """Say which moment of the video is the take's time 0."""
+def align_video(session_id: Id, body: schemas.VideoAlignment, db: Db, user: Writer) -> videos.SessionVideo:
+    """Set the video time that corresponds to trial time 0."""
     with db.write() as c:
-        return videos.align(c, who, session_id, body.offset_s)
+        return videos.align(c, user, session_id, body.offset_s)
 
 
 @router.delete("", status_code=204)
-def remove_video(session_id: Id, db: Db, who: Writer) -> None:
-    """Take the video away."""
+def remove_video(session_id: Id, db: Db, user: Writer) -> None:
+    """Remove the video."""
     with db.write() as c:
-        videos.remove(c, who, session_id)
+        videos.remove(c, user, session_id)
 
 
 @router.get(
@@ -84,11 +84,11 @@ def remove_video(session_id: Id, db: Db, who: Writer) -> None:
     },
 )
 def play_video(
-    request: Request, session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, who: Reader
+    request: Request, session_id: Id, db: Db, blobs: Blobs, trail: OpenTrail, user: Reader
 ) -> Response:
-    """The video's bytes; players ask for ranges of it."""
+    """Content of the video; supports range requests."""
     with db.read() as c:
-        found, space = videos.find_stored(c, blobs, session_id)
-    trail.record_watched(who, "video.opened", "session", session_id)
-    read = partial(blobs.read_part, space, found.sha256)
-    return answer_range(request.headers, found.size, found.sha256, read, found.media_type)
+        video, space = videos.find_stored(c, blobs, session_id)
+    trail.record_watched(user, "video.opened", "session", session_id)
+    read = partial(blobs.read_part, space, video.sha256)
+    return answer_range(request.headers, video.size, video.sha256, read, video.media_type)

@@ -1,1 +1,1 @@
-"""Commands of science: simulate, study, bench, tune, stairs, sensitivity."""
+"""Scientific commands: simulate, study, bench, tune, stairs, sensitivity."""

@@ -1,4 +1,4 @@
-"""`sagittal bench fusion`: published orientation filters, listed or scored on recordings with a reference."""
+"""`sagittal bench fusion`: list published orientation filters, or score them on reference recordings."""
 
 from __future__ import annotations
 
@@ -44,11 +44,11 @@ def bench(
     folder
         recordings (docs/science/filters.md)
     show_list
-        list them, with their sources
+        list algorithms with their sources
     out
-        write every score into a file
+        write all scores to a file
     every
-        print every recording instead of their mean
+        print each recording instead of the mean
     """
     if show_list:
         sys.stdout.write(_table(_list_algorithms()))
@@ -70,7 +70,7 @@ def bench(
 
 
 def _read_trials(folder: Path) -> list[ReferenceTrial]:
-    """Recordings of a folder that can be read; of the others what is wrong is said."""
+    """Read the recordings of a folder; errors are printed for unreadable ones."""
     from sagittal.core.errors import FormatError
     from sagittal.core.fusion.algorithms.benchmark import read_trial
 
@@ -94,10 +94,10 @@ def _score_all(trials: Sequence[ReferenceTrial]) -> list[Row]:
 def _print_scores(rows: Sequence[Row], every: bool) -> None:
     from sagittal.core.fusion.algorithms.choice import LABELS
 
-    shown = rows if every else [_average(rows, x) for x in LABELS.values()]
+    table = rows if every else [_average(rows, x) for x in LABELS.values()]
     sys.stdout.write(
         _table(
-            [("algorithm", "recording", "total °", "inclination °", "with bias °", ""), *map(_words, shown)]
+            [("algorithm", "recording", "total °", "inclination °", "with bias °", ""), *map(_words, table)]
         )
     )
     sys.stdout.write(
@@ -120,15 +120,15 @@ def _score(algorithm: Algorithm, trial: ReferenceTrial) -> Row:
     from sagittal.core.errors import SagittalError
     from sagittal.core.fusion.algorithms.benchmark import run_trial, score_orientation
 
-    found: list[float | None] = []
+    scores: list[float | None] = []
     try:
         for with_bias in (False, True):
             q = run_trial(algorithm.name, trial, with_bias=with_bias)
-            found += _degrees(score_orientation(q, trial), algorithm.magnetometer != "unused")
+            scores += _degrees(score_orientation(q, trial), algorithm.magnetometer != "unused")
     except SagittalError as error:
         return algorithm.shown, trial.name, (None,) * 6, error.message
     reason = "" if algorithm.magnetometer != "unused" else "no magnetometer: its heading is arbitrary"
-    return algorithm.shown, trial.name, tuple(found), reason
+    return algorithm.shown, trial.name, tuple(scores), reason
 
 
 def _score_own(own: OwnFilter, trial: ReferenceTrial) -> Row:
@@ -136,10 +136,10 @@ def _score_own(own: OwnFilter, trial: ReferenceTrial) -> Row:
     from sagittal.core.fusion.algorithms.benchmark import run_own, score_orientation
 
     try:
-        found = _degrees(score_orientation(run_own(trial, both_ways=own.both_ways), trial), has_heading=True)
+        scores = _degrees(score_orientation(run_own(trial, both_ways=own.both_ways), trial), has_heading=True)
     except SagittalError as error:
         return own.label, trial.name, (None,) * 6, error.message
-    return own.label, trial.name, (*found, *found), "finds the bias itself"
+    return own.label, trial.name, (*scores, *scores), "finds the bias itself"
 
 
 def _degrees(score: OrientationScore, has_heading: bool) -> list[float | None]:
@@ -152,8 +152,8 @@ def _average(rows: Sequence[Row], label: str) -> Row:
     mine = [row for row in rows if row[0] == label]
     means = []
     for values in zip(*(row[2] for row in mine), strict=True):
-        known = [v for v in values if v is not None]
-        means.append(sum(known) / len(known) if known else None)
+        finite = [v for v in values if v is not None]
+        means.append(sum(finite) / len(finite) if finite else None)
     reason = next((row[3] for row in mine if row[3]), "")
     scored = sum(any(v is not None for v in row[2]) for row in mine)
     return label, f"mean of {scored} of {len(mine)}", tuple(means), reason

@@ -1,4 +1,4 @@
-"""`sagittal sensitivity`: the sensitivity analysis of a squat, in the layout of Kianifar's tables 2 and 3."""
+"""`sagittal sensitivity`: sensitivity analysis of a squat, formatted as Kianifar's tables 2 and 3."""
 
 from __future__ import annotations
 
@@ -40,26 +40,26 @@ def sensitivity(
     out: Annotated[Path | None, Parameter(metavar="CSV")] = None,
     seed: Seed = 1,
 ) -> int:
-    """Analyse a take, against a reference where one is given, or a simulated one; 1 = not possible.
+    """Analyse a trial, optionally against a reference, or a simulated one; 1 if not possible.
 
     Parameters
     ----------
     paths
-        files of one take (default: a simulated one)
+        files of one trial (default: a simulated one)
     reference
-        angles.parquet to hold the angles against (default: themselves)
+        angles.parquet to compare the angles with (default: themselves)
     table_top
-        take in which sensors left the table
+        trial in which the sensors were lifted off a table
     side
-        leg that squats (default: all with sensors)
+        leg to analyse (default: all with sensors)
     measures
         lengths in m (docs/science/squat.md)
     from_standing
-        compare angles from standing
+        compare angles relative to standing
     out
-        write every figure into a file
+        write all results to a file
     seed
-        of the simulated take
+        seed of the simulated trial
     """
     from sagittal.server.report.view.sensitivity import (
         sensitivity_csv,
@@ -77,24 +77,26 @@ def sensitivity(
     except SagittalError as error:
         sys.stderr.write(f"No sensitivity ({error.code}): {error.message}\n")
         return 1
-    found = summarise_sensitivity(tables, against, from_standing=from_standing)
+    summary = summarise_sensitivity(tables, against, from_standing=from_standing)
     if out is not None:
         fs.make_folder(out.parent)
-        fs.write_file(out, sensitivity_csv(found))
-    sys.stdout.write("\n".join(tell_sensitivity(found)) + "\n")
+        fs.write_file(out, sensitivity_csv(summary))
+    sys.stdout.write("\n".join(tell_sensitivity(summary)) + "\n")
     sys.stdout.flush()
     return 0
 
 
 def analyse_simulated(seed: int, side: Side) -> dict[Side, SensitivityTable]:
-    """The sensitivity analysis of `simulate_case`."""
+    """Sensitivity analysis of `simulate_case`."""
     from sagittal.core.squat.sensitivity import analyse_sensitivity
 
     return {side: analyse_sensitivity(simulate_case(seed, side))}
 
 
 def simulate_case(seed: int, side: Side) -> SquatCase:
-    """Half a minute of squats with noise and skin; how sensors sit and the body are known exactly."""
+    """Half a minute of squats with sensor noise and soft-tissue motion; body and alignment are known
+    exactly.
+    """
     from sagittal.core.calibration.known_mounts import calibrate_with_mounts
     from sagittal.core.simulate import RecordingSetup, SoftTissue, Squats, simulate_squats
     from sagittal.core.simulate.squat_chain import draw_leg, place_sensors
@@ -102,15 +104,15 @@ def simulate_case(seed: int, side: Side) -> SquatCase:
     from sagittal.core.timeline import synchronise
 
     leg, mounts = draw_leg(HEIGHT_M, side, seed)
-    made = simulate_squats(
+    simulation = simulate_squats(
         Squats(side=side, hinged=True, repetitions=6),
         HEIGHT_M,
         seed,
         RecordingSetup(tissue=SoftTissue()),
         place_sensors(leg, HEIGHT_M, mounts),
     )
-    calibrated = calibrate_with_mounts(synchronise(made.recording), mounts, "known", 1.0)
-    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    calibrated = calibrate_with_mounts(synchronise(simulation.recording), mounts, "known", 1.0)
+    truth = ReferenceAngles(simulation.truth.t_s, simulation.truth.angles)
     return make_case(calibrated, leg, truth, from_standing=False)
 
 
@@ -163,19 +165,19 @@ def _calibrate(
 
 
 def _measure(nominal: LegGeometry, path: Path | None) -> LegGeometry:
-    """The geometry with the lengths of a JSON file put in."""
+    """Leg geometry with the segment lengths of a JSON file."""
     from sagittal.core.formats import read_named_file
     from sagittal.core.formats.json_tree import read_json
 
     if path is None:
         return nominal
     try:
-        given = read_json(read_named_file(path))
+        lengths = read_json(read_named_file(path))
     except ValueError as error:
         raise InputError("measures_unreadable", f"{path} cannot be read as JSON: {error}.") from error
     names = {f.name for f in fields(nominal)} - {"side", "estimated"}
-    if not isinstance(given, dict) or not set(given) <= names:
+    if not isinstance(lengths, dict) or not set(lengths) <= names:
         raise InputError("measures_unreadable", f"{path} may hold {', '.join(sorted(names))}, in m.")
-    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in given.values()):
+    if not all(isinstance(v, int | float) and not isinstance(v, bool) for v in lengths.values()):
         raise InputError("measures_unreadable", f"{path} holds a length that is no number.")
-    return replace(nominal, **given, estimated=not given)
+    return replace(nominal, **lengths, estimated=not lengths)

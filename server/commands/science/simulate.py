@@ -1,4 +1,4 @@
-"""`sagittal simulate`: a recording and what really happened, in the files an analysis reads and writes."""
+"""`sagittal simulate`: write a simulated recording with its ground truth in the usual file formats."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ ACTIVITY: Final = "activity"
 
 
 def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: float = 24.0) -> int:
-    """Write `recording.parquet` and `truth/` into `out`; 2 = no such script.
+    """Write `recording.parquet` and `truth/` into `out`; 2 = unknown script.
 
-    Truth of a walk: angles, events, strides; of squats, of swings and bows: angles, phases; of a chest:
-    trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily life: phases
-    and steps.
+    Ground truth of a walk: angles, events, strides; of squats, leg swings and bows: angles, phases; of a
+    chest sensor: trunk, phases; of a test that begins on a chair: trunk, segments, scripted changes; of daily
+    life: phases and steps.
 
     Parameters
     ----------
     out
-        folder for recording and truth
+        folder for recording and ground truth
     script
         comfortable, fast_with_turns, hemiparetic, squats, postures, activity … (docs/science/simulation.md)
     hours
-        of daily life, --script activity (default 24)
+        duration of daily life, --script activity (default 24)
     """
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import (
@@ -55,52 +55,52 @@ def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: f
         return _simulate_activity(out, seed, hours)
     walks = {**SCRIPTS, **IMPAIRED_WALKS}
     if script not in walks and script not in MOVEMENTS:
-        known = ", ".join((*walks, *MOVEMENTS, ACTIVITY))
-        sys.stderr.write(f"No script '{script}'; expected one of {known}.\n")
+        names = ", ".join((*walks, *MOVEMENTS, ACTIVITY))
+        sys.stderr.write(f"No script '{script}'; expected one of {names}.\n")
         return 2
-    made = simulate_scenario(script, seed) if script in walks else simulate_movement(script, seed)
-    if isinstance(made, Simulation):
-        files, facts = _walk(made.truth)
-    elif isinstance(made, SquatSimulation):
-        files, facts = _squats(made.truth)
-    elif isinstance(made, FunctionalSimulation):
-        files, facts = _functional(made.truth)
-    elif isinstance(made, ChairSimulation):
-        files, facts = _chair(made.truth)
+    simulation = simulate_scenario(script, seed) if script in walks else simulate_movement(script, seed)
+    if isinstance(simulation, Simulation):
+        files, facts = _walk(simulation.truth)
+    elif isinstance(simulation, SquatSimulation):
+        files, facts = _squats(simulation.truth)
+    elif isinstance(simulation, FunctionalSimulation):
+        files, facts = _functional(simulation.truth)
+    elif isinstance(simulation, ChairSimulation):
+        files, facts = _chair(simulation.truth)
     else:
-        files, facts = _chest(made.truth)
+        files, facts = _chest(simulation.truth)
     title = (walks[script] if script in walks else MOVEMENTS[script]).title
     truth = {"script": script, "title": title, "seed": seed, **facts}
     files |= {
-        "recording.parquet": write_recording(made.recording),
+        "recording.parquet": write_recording(simulation.recording),
         "truth/truth.json": json.dumps(truth, indent=1).encode(),
     }
     _write_files(out, files)
-    sys.stdout.write(f"{title}, {made.truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
+    sys.stdout.write(f"{title}, {simulation.truth.t_s[-1]:.1f} s, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
 
 
 def _simulate_activity(out: Path, seed: int, hours: float) -> int:
-    """Write hours of daily life of one sensor on the chest."""
+    """Write hours of daily life of one chest sensor."""
     from sagittal.core.errors import ParameterError
     from sagittal.core.formats import write_recording
     from sagittal.core.simulate import phase_table
     from sagittal.core.simulate.daily import plan_daily_life, record_daily_life, simulate_daily_life
 
     try:
-        made = simulate_daily_life(plan_daily_life(hours, seed), seed=seed)
+        simulation = simulate_daily_life(plan_daily_life(hours, seed), seed=seed)
     except ParameterError as error:
         sys.stderr.write(f"{error.message}\n")
         return 2
-    truth = {"script": ACTIVITY, "title": "Daily life", "seed": seed, "steps_s": made.steps_s.tolist()}
+    truth = {"script": ACTIVITY, "title": "Daily life", "seed": seed, "steps_s": simulation.steps_s.tolist()}
     files = {
-        "recording.parquet": write_recording(record_daily_life(made)),
-        "truth/phases.csv": _csv(phase_table(made.phases)),
+        "recording.parquet": write_recording(record_daily_life(simulation)),
+        "truth/phases.csv": _csv(phase_table(simulation.phases)),
         "truth/truth.json": json.dumps(truth, indent=1).encode(),
     }
     _write_files(out, files)
-    sys.stdout.write(f"Daily life, {made.stream.duration_s / 3600:.1f} h, seed {seed}, in {out}\n")
+    sys.stdout.write(f"Daily life, {simulation.stream.duration_s / 3600:.1f} h, seed {seed}, in {out}\n")
     sys.stdout.flush()
     return 0
 

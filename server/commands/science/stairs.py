@@ -1,4 +1,4 @@
-"""`sagittal stairs`: a person's own limits of stairs, as overrides that `sagittal analyse --config` takes."""
+"""`sagittal stairs`: individual stair limits, as overrides for `sagittal analyse --config`."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ def stairs(
     out: Annotated[Path, Parameter(metavar="JSON")],
     manifest: Manifest = None,
 ) -> int:
-    """Measure the limits on walks of one recording and write them into `out`.
+    """Measure the limits on walks of one recording and write them to `out`.
 
     Parameters
     ----------
     level
-        when they walked on the level, s from the first sample
+        period of level walking, s from the first sample
     up
-        when they walked upstairs, s from the first sample
+        period of walking upstairs, s from the first sample
     down
-        when they walked downstairs, s from the first sample
+        period of walking downstairs, s from the first sample
     out
-        file for `analyse --config`
+        output file for `analyse --config`
 
     Returns
     -------
-    0, or 1 when the recording does not give them.
+    0, or 1 if the limits cannot be determined.
     """
     from sagittal.core.activity.monitor import calibrate_on_walks
     from sagittal.core.formats import list_source_files, read_named_file, read_recording

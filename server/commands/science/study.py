@@ -1,4 +1,4 @@
-"""`sagittal study`: every recording of a folder analysed, one table of all strides and one of all takes."""
+"""`sagittal study`: analyse every recording of a folder into one table of strides and one of trials."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ _STATE: Final = "state.json"
 
 
 def study(folder: Path, /, *, out: Path, config: Path | None = None, jobs: Whole | None = None) -> int:
-    """Analyse every take of a folder; what is done already, with the same files and settings, is kept.
+    """Analyse every trial of a folder; results with the same files and settings are reused.
 
     Parameters
     ----------
     folder
-        recordings in any layout, BIDS too
+        recordings in any layout, including BIDS
     out
-        folder for the tables; run again, it goes on
+        folder for the tables; running again resumes
     config
-        JSON: parameters by stage, for every take
+        JSON: parameters by stage, for every trial
     jobs
-        takes at a time (default: one per processor)
+        parallel trials (default: one per processor)
 
     Returns
     -------
-    0 when at least one take was analysed, 1 when none was or there is none.
+    0 if at least one trial was analysed, otherwise 1.
     """
     from sagittal.core.formats.takes import find_takes
     from sagittal.server.commands.analyse import read_overrides
@@ -86,7 +86,7 @@ def study(folder: Path, /, *, out: Path, config: Path | None = None, jobs: Whole
 def _analyse_all(
     takes: Sequence[FoundTake], out: Path, config: Mapping[str, Any], jobs: int
 ) -> dict[str, dict[str, Any]]:
-    """State of every take by its name; those that are not done yet are analysed, several at a time."""
+    """State of every trial by name; pending ones are analysed in parallel."""
     states: dict[str, dict[str, Any]] = {}
     waiting: list[tuple[FoundTake, dict[str, str]]] = []
     for take in takes:
@@ -120,14 +120,16 @@ def _analyse_all(
 
 
 def _died(error: BaseException) -> dict[str, Any]:
-    why = f"The analysis ended unexpectedly ({type(error).__name__}: {error}); run again, or tell the makers."
-    return {"sha256": {}, "config": {}, "code_version": CODE_VERSION, "code": "died", "message": why}
+    message = (
+        f"The analysis ended unexpectedly ({type(error).__name__}: {error}); run again, or tell the makers."
+    )
+    return {"sha256": {}, "config": {}, "code_version": CODE_VERSION, "code": "died", "message": message}
 
 
 def analyse_take(
     paths: Sequence[Path], folder: Path, config: dict[str, Any], sha256: dict[str, str]
 ) -> dict[str, Any]:
-    """Analyse one take in a process of its own; its state last, so that what was cut off is done again."""
+    """Analyse one trial in its own process; its state is written last, so interrupted ones are repeated."""
     from sagittal.core.formats.source import SourceFile
     from sagittal.server.results import analysing
 
@@ -136,10 +138,10 @@ def analyse_take(
     fs.make_folder(folder)
     try:
         files = [SourceFile.of_path(path) for path in paths]
-        found = analysing.run(files, None, config, lambda stage, share: None)
+        result_files = analysing.run(files, None, config, lambda stage, share: None)
         for name in KEPT:
-            if name in found:
-                fs.write_file(folder / name, found[name])
+            if name in result_files:
+                fs.write_file(folder / name, result_files[name])
     except SagittalError as error:
         state |= {"code": error.code, "message": error.message}
     fs.write_file(folder / _STATE, json.dumps(state, ensure_ascii=False).encode())

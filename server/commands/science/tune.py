@@ -1,4 +1,4 @@
-"""`sagittal tune`: gains of one filter fitted to recordings with a reference, by the service's code."""
+"""`sagittal tune`: fit the gains of one filter to reference recordings, using the service's code."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ def tune(
     rounds: Whole | None = None,
     random_rounds: Whole | None = None,
 ) -> int:
-    """Fit gains to the trials of a folder and write them to `out`; a checkpoint lies beside it meanwhile.
+    """Fit gains to the trials of a folder and write them to `out`; checkpoints are written alongside.
 
     Parameters
     ----------
     folder
         recordings (docs/science/filters.md)
     algorithm
-        of `sagittal bench fusion --list`
+        name from `sagittal bench fusion --list`
     validation
-        recordings that only judge, without .npz
+        names of validation recordings, without .npz
     out
         default tuned.json
     resume
-        go on from the checkpoint of a stopped run
+        continue from the checkpoint of a stopped run
     scheme
-        how gains follow the motion (default: as the algorithm's own)
+        adaptation of gains to the motion (default: the algorithm's)
     magnetometer
-        default: where it can
+        default: if supported
     particles
         of the swarm (default: the thesis')
     iterations
@@ -59,7 +59,7 @@ def tune(
 
     Returns
     -------
-    0 = done, better or not; 1 = not possible, 130 = interrupted.
+    0 = done, improved or not; 1 = not possible, 130 = interrupted.
     """
     from sagittal.core.errors import SagittalError
     from sagittal.core.formats import list_source_files, read_named_file
@@ -98,5 +98,5 @@ def _say_progress(share: float, message: str) -> None:
 
 
 def _explain_stop(checkpoint: Path) -> None:
-    again = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
-    sys.stderr.write(f"\nStopped. {again}\n")
+    hint = f"The same command with --resume {checkpoint} goes on." if checkpoint.exists() else ""
+    sys.stderr.write(f"\nStopped. {hint}\n")

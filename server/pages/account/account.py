@@ -1,4 +1,4 @@
-"""One's own account."""
+"""Account page of the signed-in user."""
 
 from __future__ import annotations
 
@@ -32,20 +32,23 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 @router.get("/account")
 def show_account(
-    request: Request, db: Db, settings: Config, who: Annotated[Identity, require(Action.USE_ACCOUNT)]
+    request: Request, db: Db, settings: Config, user: Annotated[Identity, require(Action.USE_ACCOUNT)]
 ) -> Response:
-    """One's own password, second factor, keys and tokens, and signing out."""
+    """Password, second factor, security keys, tokens and sign-out of the signed-in user."""
     with db.read() as c:
-        tokens = api_tokens.list_tokens(c, who.user_id)
-        has_factor, codes = second_factor.is_on(c, who.user_id), second_factor.count_recovery(c, who.user_id)
+        tokens = api_tokens.list_tokens(c, user.user_id)
+        has_factor, codes = (
+            second_factor.is_on(c, user.user_id),
+            second_factor.count_recovery(c, user.user_id),
+        )
         keys, keys_only = (
-            security_keys.list_keys(c, who.user_id),
-            second_factor.takes_keys_only(c, who.user_id),
+            security_keys.list_keys(c, user.user_id),
+            second_factor.takes_keys_only(c, user.user_id),
         )
     keys_work = site_of(request, behind_tls=settings.behind_tls).has_keys
     return render_page(
-        request, db, who, "account.html", "account",
-        user=who, role_text=ROLE_WORDS[who.role], min_password=MIN_LENGTH, tokens=tokens, at=now(),
+        request, db, user, "account.html", "account",
+        user=user, role_text=ROLE_WORDS[user.role], min_password=MIN_LENGTH, tokens=tokens, at=now(),
         scopes=[(scope.value, word) for scope, word in SCOPE_WORDS.items()],
         keys=keys, keys_only=keys_only, keys_work=keys_work,
         has_factor=has_factor, codes=codes, most_days=api_tokens.MOST_DAYS,

@@ -1,4 +1,4 @@
-"""The pages of who is not signed in yet: the door, and the first account."""
+"""Pages before sign-in: the sign-in form, and set-up of the first account."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/")
-def go_home(who: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
-    """Go to the patients."""
+def go_home(user: Annotated[Identity, require(Action.READ_PATIENT)]) -> Response:
+    """Redirect to the patient list."""
     return RedirectResponse("/patients", status_code=303)
 
 
 @router.get("/sign-in", dependencies=[require(Action.SIGN_IN)])
 def show_sign_in(request: Request, next: Annotated[str, Query(max_length=2000)] = "/patients") -> Response:  # noqa: A002 - the name in the address
-    """Ask for name and password."""
+    """Sign-in form."""
     return render(request, "sign-in.html", {"next": local_path(next)})
 
 
 @router.get("/set-up/{token}", dependencies=[require(Action.SET_UP)])
 def show_set_up(request: Request, db: Db, token: str) -> Response:
-    """Make the first account, from the address printed at the first start."""
+    """Form for creating the first account, at the link printed at the first start."""
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
     context = {"token": token, "valid": valid, "min_password": MIN_LENGTH}

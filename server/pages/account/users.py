@@ -1,4 +1,4 @@
-"""Who may sign in, and as what."""
+"""User accounts and roles."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 
 @router.get("/users")
-def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
-    """Who may sign in, and as what."""
+def show_users(request: Request, db: Db, user: Annotated[Identity, require(Action.MANAGE_USERS)]) -> Response:
+    """User accounts and roles."""
     with db.read() as c:
         rows = accounts.list_accounts(c)
         care_teams_on = care_teams.are_on(c)
@@ -31,7 +31,7 @@ def show_users(request: Request, db: Db, who: Annotated[Identity, require(Action
     roles = [(role.value, ROLE_WORDS[role]) for role in Role]
     options = [(role.value, role.value) for role in Role]
     return render_page(
-        request, db, who, "users.html", "users",
+        request, db, user, "users.html", "users",
         users=rows, roles=roles, role_options=options, min_password=MIN_LENGTH,
         with_factor=with_factor, care_teams_on=care_teams_on,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The clinic's sensors: how each one is, and what its takes showed; no patient and no visit is named."""
+"""Sensors of the clinic: condition and checks, without reference to patients or visits."""
 
 from __future__ import annotations
 
@@ -46,28 +46,30 @@ LIMITS: Final = {
 
 
 @router.get("/sensors")
-def show_devices(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_DEVICE)]) -> Response:
-    """Every sensor of the clinic with its last place and its verdict."""
+def show_devices(
+    request: Request, db: Db, user: Annotated[Identity, require(Action.READ_DEVICE)]
+) -> Response:
+    """All sensors of the clinic with last placement and assessment."""
     with db.read() as c:
         rows = [_row(d) for d in devices.list_devices(c)]
     rows.sort(key=lambda row: row["verdict"].kind != "warn")
-    return render_page(request, db, who, "devices.html", "devices", devices=rows, limits=LIMITS)
+    return render_page(request, db, user, "devices.html", "devices", devices=rows, limits=LIMITS)
 
 
 @router.get("/sensors/{device_id}")
 def show_device(
-    request: Request, db: Db, device_id: DeviceId, who: Annotated[Identity, require(Action.READ_DEVICE)]
+    request: Request, db: Db, device_id: DeviceId, user: Annotated[Identity, require(Action.READ_DEVICE)]
 ) -> Response:
-    """One sensor over its takes."""
+    """History of one sensor."""
     with db.read() as c:
-        known = devices.get(c, device_id)
+        device = devices.get(c, device_id)
     view: dict[str, Any] = {
-        "d": _row(known),
-        "charts": _charts(known),
-        "takes": _takes(known),
+        "d": _row(device),
+        "charts": _charts(device),
+        "takes": _takes(device),
         "limits": LIMITS,
     }
-    return render_page(request, db, who, "device.html", "devices", **view)
+    return render_page(request, db, user, "device.html", "devices", **view)
 
 
 def _row(d: KnownDevice) -> dict[str, Any]:
@@ -84,7 +86,7 @@ def _row(d: KnownDevice) -> dict[str, Any]:
 
 
 def _figures(check: DeviceCheck | None) -> dict[str, str]:
-    """Figures of a check as text, a dash where there is none."""
+    """Values of a check as text, a dash if missing."""
     if check is None or check.gyro_bias is None or check.gravity_scale is None:
         return dict.fromkeys(("bias", "scale", "gyro_noise", "acc_noise", "rest"), "–")
     start, end = check.rest_s or (0.0, 0.0)
@@ -98,7 +100,7 @@ def _figures(check: DeviceCheck | None) -> dict[str, str]:
 
 
 def _takes(d: KnownDevice) -> list[dict[str, Any]]:
-    """The takes of a sensor as rows of a table, the newest first."""
+    """Trials of a sensor as table rows, newest first."""
     return [
         {
             "day": x.day,
@@ -112,7 +114,7 @@ def _takes(d: KnownDevice) -> list[dict[str, Any]]:
 
 
 def _charts(d: KnownDevice) -> list[dict[str, str]]:
-    """Bias and gravity, with the bands that the verdict is made by, and both noises."""
+    """Charts of bias and gravity with tolerance bands, and of both noise levels."""
     checks, days, course = [x.check for x in d.checks], [x.day for x in d.checks], d.course
     charts: list[dict[str, str]] = []
 
@@ -144,7 +146,7 @@ def _charts(d: KnownDevice) -> list[dict[str, str]]:
 
 
 def _find_scale_band(course: DeviceCourse) -> tuple[float, float] | None:
-    """Gravity in percent where the newest check is not told; None where nothing can be compared."""
+    """Range of gravity in percent without a notice; None if there is nothing to compare with."""
     if course.usual_scale is None:
         return None
     usual = 100.0 * course.usual_scale

@@ -1,4 +1,4 @@
-"""Who a patient is, beside the pseudonym: a page of its own, so that each look at it is written down."""
+"""Identity of a patient, on a separate page so that each access is audited."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ def show_identity(
     db: Db,
     settings: Config,
     pid: Id,
-    who: Annotated[Identity, require(Action.READ_IDENTITY)],
+    user: Annotated[Identity, require(Action.READ_IDENTITY)],
 ) -> Response:
-    """Name, date of birth, numbers and contact, to read and to change."""
+    """View and edit name, date of birth, numbers and contact."""
     with db.read() as c:
         patient = patients.get(c, pid)
-        known = identities.get(c, settings.identity_key_file, pid)
-    state_of(request).trail.record_opened(who, "identity.opened", "patient", pid)
+        identity = identities.get(c, settings.identity_key_file, pid)
+    state_of(request).trail.record_opened(user, "identity.opened", "patient", pid)
     return render_page(
-        request, db, who, "identity.html", "patients",
-        patient=patient, known=known, most=identities.MOST, oldest=identities.OLDEST,
+        request, db, user, "identity.html", "patients",
+        patient=patient, known=identity, most=identities.MOST, oldest=identities.OLDEST,
     )  # fmt: skip
 
 
 def offers_identity(settings: Settings) -> bool:
-    """Whether pages lead to names: there is a key, or a setting says where it ought to be; asks no table.
+    """Whether to link to identities: a key exists or is configured; reads no table.
 
-    A missing key is said by the page that they lead to.
+    A missing key is reported on the linked page.
     """
     return bool(settings.identity_key) or settings.identity_key_file.is_file()
 
 
 def name_on_paper(
-    request: Request, db: Database, settings: Settings, who: Identity, patient_id: str, *, named: bool
+    request: Request, db: Database, settings: Settings, user: Identity, patient_id: str, *, named: bool
 ) -> dict[str, Any]:
-    """What a report needs to bear the name, where that is asked for and allowed; the look is written down.
+    """Template context for printing the patient's name on a report, if requested and permitted; audited.
 
-    What is signed, and so what a link leads to, never passes here.
+    Not used for signed reports, which may be shared by links.
     """
-    may, known = who.may(Action.READ_IDENTITY) and offers_identity(settings), None
+    may, identity = user.may(Action.READ_IDENTITY) and offers_identity(settings), None
     if may and named:
         with db.read() as c:
-            known = identities.get(c, settings.identity_key_file, patient_id)
-        state_of(request).trail.record_opened(who, "identity.printed", "patient", patient_id)
-    return {"may_name": may, "person": known}
+            identity = identities.get(c, settings.identity_key_file, patient_id)
+        state_of(request).trail.record_opened(user, "identity.printed", "patient", patient_id)
+    return {"may_name": may, "person": identity}

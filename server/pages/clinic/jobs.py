@@ -1,4 +1,4 @@
-"""What is being computed, and what was."""
+"""Current and past computations."""
 
 from __future__ import annotations
 
@@ -42,18 +42,18 @@ KIND_WORDS: Final = {
 
 
 @router.get("/jobs")
-def show_jobs(request: Request, db: Db, who: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
-    """What is being computed, and what was."""
+def show_jobs(request: Request, db: Db, user: Annotated[Identity, require(Action.READ_JOB)]) -> Response:
+    """Current and past computations."""
     with db.read() as c:
-        rows = list_jobs(c, who)
-    record_listing(request, who, "job")
-    return render_page(request, db, who, "jobs.html", "jobs", jobs=rows)
+        rows = list_jobs(c, user)
+    record_listing(request, user, "job")
+    return render_page(request, db, user, "jobs.html", "jobs", jobs=rows)
 
 
-def list_jobs(c: Connection, who: Identity) -> list[dict[str, Any]]:
-    """The newest jobs that a person may see, each with its visit."""
+def list_jobs(c: Connection, user: Identity) -> list[dict[str, Any]]:
+    """Latest jobs that a user may see, with their visits."""
     rows = []
-    for view in jobs.list_jobs(c, who, limit=JOBS_SHOWN):
+    for view in jobs.list_jobs(c, user, limit=JOBS_SHOWN):
         shape, word = JOB_WORDS[view.state]
         ended = view.started_at and view.finished_at
         visit = {"id": view.session_id, "code": view.patient_code, "title": view.session_title}

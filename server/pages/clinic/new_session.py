@@ -1,4 +1,4 @@
-"""The form of a new visit."""
+"""Form for a new visit."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 @router.get("/patients/{pid}/sessions/new")
 def show_new_session(
-    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.CREATE_SESSION)]
+    request: Request, db: Db, pid: Id, user: Annotated[Identity, require(Action.CREATE_SESSION)]
 ) -> Response:
-    """Ask for protocol, date, height and walking condition of a new visit."""
+    """Form with protocol, date, height and walking condition of a new visit."""
     today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)
         plans = programmes.of_patient(c, pid)
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     open_visits = [v for plan in plans[:1] for v in plan.visits if v.session_id is None]
     return render_page(
-        request, db, who, "session-new.html", "patients",
+        request, db, user, "session-new.html", "patients",
         patient=patient, protocols=(*PROTOCOLS, *TEST_PROTOCOLS),
         today=today.isoformat(), open_visits=open_visits,
         near=plans[0].near(today) if plans else None, usual=USUAL,

@@ -1,4 +1,4 @@
-"""The list of patients."""
+"""Patient list."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.parameters.catalogue import CATALOGUE
+from sagittal.core.user_text import UserText
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -28,7 +29,6 @@ from sagittal.server.results import analyses, edit_log, visits
 from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.server.sharing import care_teams
 from sagittal.server.storage.schema.tables import now
-from sagittal.web.user_text import UserText
 from sagittal.web.words import number
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -50,19 +50,19 @@ def show_patients(
     request: Request,
     db: Db,
     reviewed: Reviewed,
-    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    user: Annotated[Identity, require(Action.READ_PATIENT)],
     q: Annotated[str, Query(max_length=200)] = "",
 ) -> Response:
-    """All patients, the latest visit first."""
+    """All patients, latest visit first."""
     with db.read() as c:
-        found = patients.list_counted(c, who, search=q, limit=PATIENTS_SHOWN)
-        rows = list_patients(c, reviewed, found.patients, results=who.may(Action.READ_RESULT))
-    record_listing(request, who, "patient")
+        listed = patients.list_counted(c, user, search=q, limit=PATIENTS_SHOWN)
+        rows = list_patients(c, reviewed, listed.patients, results=user.may(Action.READ_RESULT))
+    record_listing(request, user, "patient")
     return render_page(
-        request, db, who, "patients.html", "patients", found.active_jobs,
-        patients=rows, query=UserText(q), total=found.total,
+        request, db, user, "patients.html", "patients", listed.active_jobs,
+        patients=rows, query=UserText(q), total=listed.total,
         filters=[(key, words, sum(not key or key in r["kinds"] for r in rows)) for key, words in FILTERS],
-        results=who.may(Action.READ_RESULT), in_teams=found.teams_on and not who.is_admin,
+        results=user.may(Action.READ_RESULT), in_teams=listed.teams_on and not user.is_admin,
         hours=care_teams.EMERGENCY // HOUR,
     )  # fmt: skip
 
@@ -73,23 +73,23 @@ def view_patient(p: Patient) -> dict[str, Any]:
 
 
 def list_patients(
-    c: Connection, reviewed: ReviewedAnalyses, found: Sequence[Patient], *, results: bool
+    c: Connection, reviewed: ReviewedAnalyses, listed: Sequence[Patient], *, results: bool
 ) -> list[dict[str, Any]]:
-    """Rows of the patients list, each with the state of its latest visit; with `results`, of its data."""
+    """Rows of the patient list with the state of the latest visit and, with `results`, its data quality."""
     rows = []
     takes = {take.patient_id: describe_live(take) for take in live.list_running(c)}
-    newest = sessions.newest_of(c, [p.id for p in found])
-    running = find_active_jobs(c, [p.id for p in found], lambda j: j.patient_id)
+    newest = sessions.newest_of(c, [p.id for p in listed])
+    running = find_active_jobs(c, [p.id for p in listed], lambda j: j.patient_id)
     today = now().date()
-    plans = programmes.read_plans(c, [p.id for p in found], today)
-    walks = visits.choose_newest_walks(c, [p.id for p in found], plans.kinds) if results else {}
-    wanted = {s.id for s in newest.values()} | {w.id for chosen in walks.values() for w in chosen}
-    shown = analyses.latest_of(c, wanted) if results else {}
-    edits = edit_log.edits_of_all(c, [a.id for a in shown.values()])
-    speeds = visits.read_newest_speeds(reviewed, walks, shown, edits)
-    for p in found:
+    plans = programmes.read_plans(c, [p.id for p in listed], today)
+    walks = visits.choose_newest_walks(c, [p.id for p in listed], plans.kinds) if results else {}
+    session_ids = {s.id for s in newest.values()} | {w.id for chosen in walks.values() for w in chosen}
+    records = analyses.latest_of(c, session_ids) if results else {}
+    edits = edit_log.edits_of_all(c, [a.id for a in records.values()])
+    speeds = visits.read_newest_speeds(reviewed, walks, records, edits)
+    for p in listed:
         if p.id in newest:
-            last = judge_visit(reviewed, newest[p.id], shown.get(newest[p.id].id), edits)
+            last = judge_visit(reviewed, newest[p.id], records.get(newest[p.id].id), edits)
         else:
             last = {"kind": "none", "text": "No session yet"}
         row: dict[str, Any] = {

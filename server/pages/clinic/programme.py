@@ -1,4 +1,4 @@
-"""The programme of a patient: every planned visit, and which session it was."""
+"""Training programme of a patient: planned visits and their sessions."""
 
 from __future__ import annotations
 
@@ -36,18 +36,18 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
 
 @router.get("/patients/{pid}/programme")
 def show_programme(
-    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request, db: Db, pid: Id, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
-    """The newest programme of a patient: every planned visit, and which session it was."""
+    """Latest programme of a patient: planned visits and their sessions."""
     today = now().date()
     with db.read() as c:
         patient = patients.get(c, pid)
         plans = programmes.of_patient(c, pid)
         linked = {v.session_id for plan in plans for v in plan.visits}
         free = [s for s in sessions.of_patient(c, pid) if s.id not in linked]
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     return render_page(
-        request, db, who, "programme.html", "patients",
+        request, db, user, "programme.html", "patients",
         patient=patient,
         programme=view_programme(plans[0], today) if plans else None,
         course=SIX_WEEKS,
@@ -57,21 +57,21 @@ def show_programme(
 
 
 def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
-    """A programme as a strip of weeks and a list."""
+    """Template context of a programme: timeline of weeks and list."""
     now_week = (today - programme.starts_on).days // 7 + 1
     weeks = range(min(v.week for v in programme.visits), max(v.week for v in programme.visits) + 1)
     upcoming = programme.next
     visits = len(programme.visits)
-    said = [f"{programme.count('done')} of {visits} {plural(visits, 'visit', 'visits')} done"]
+    parts = [f"{programme.count('done')} of {visits} {plural(visits, 'visit', 'visits')} done"]
     if missing := programme.count("missing"):
-        said.append(f"{missing} missing")
+        parts.append(f"{missing} missing")
     if upcoming is not None:
-        said.append(f"next {upcoming.label} on {day(upcoming.planned_on)}")
+        parts.append(f"next {upcoming.label} on {day(upcoming.planned_on)}")
     return {
         "id": programme.id,
         "starts_on": programme.starts_on,
         "words": programme.words,
-        "summary": ", ".join(said),
+        "summary": ", ".join(parts),
         "weeks": [_week(programme, week, now=week == now_week) for week in weeks],
         "visits": [_planned(v) for v in programme.visits],
     }
@@ -82,9 +82,9 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     trainings = [v for v in mine if v.kind == "training"]
     done = sum(v.state == "done" for v in trainings)
     missing = sum(v.state == "missing" for v in trainings)
-    said = f"{done} of {len(trainings)} {plural(len(trainings), 'training', 'trainings')} done"
+    text = f"{done} of {len(trainings)} {plural(len(trainings), 'training', 'trainings')} done"
     if missing:
-        said += f", {missing} missing"
+        text += f", {missing} missing"
     # the course counts weeks without a week 0: the one before the first training is −1
     return {
         "name": "now" if now else f"wk {format_number(week if week > 0 else week - 1)}",
@@ -92,7 +92,7 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
         "gap": not mine,
         "assessments": [v for v in mine if v.kind == "assessment"],
         "trainings": trainings,
-        "words": said,
+        "words": text,
     }
 
 

@@ -1,4 +1,4 @@
-"""What a list says of a visit: a shape and a word."""
+"""Status of a visit in lists: symbol and word."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ LIVE_STATES: Final[Mapping[str, tuple[str, str]]] = {
 
 
 def describe_live(take: live.LiveTakeRecord) -> dict[str, str]:
-    """Session, shape and word of a running live take."""
+    """Session, symbol and word of a running live trial."""
     kind, text = LIVE_STATES[take.state]
     return {"session": take.session_id, "kind": kind, "text": text}
 
 
 def describe_state(state: str) -> dict[str, str]:
-    """Shape and word of a session's state."""
+    """Symbol and word of a session's state."""
     kind, text = STATES[state]
     return {"kind": kind, "text": text}
 
@@ -43,14 +43,14 @@ def describe_state(state: str) -> dict[str, str]:
 def judge_visit(
     reviewed: ReviewedAnalyses,
     s: sessions.Session,
-    shown: analyses.AnalysisRecord | None,
+    record: analyses.AnalysisRecord | None,
     edits: Mapping[str, edit_log.EditHistory],
 ) -> dict[str, str]:
-    """What a list says of a session: of one that is analysed how good its data are, as its own page does."""
-    if s.state != "done" or shown is None or "analysis.json" not in shown.files:
+    """Status of a session in lists: data quality if analysed, as on its own page."""
+    if s.state != "done" or record is None or "analysis.json" not in record.files:
         return describe_state(s.state)
     try:
-        kind, text = reviewed.read_verdict(shown, edits[shown.id])
+        kind, text = reviewed.read_verdict(record, edits[record.id])
     except UNREADABLE:
         kind, text = "bad", "Cannot be read"
     return {"kind": kind, "text": text}

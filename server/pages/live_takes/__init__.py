@@ -1,1 +1,1 @@
-"""Pages of live takes."""
+"""Pages of live trials."""

@@ -1,4 +1,4 @@
-"""The page that turns a phone or tablet into the source of a live take; it is open to who has its code."""
+"""Page that makes a phone or tablet the source of a live trial; accessible with its code."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FILM_BITS_PER_S: Final = 1_500_000
 
 @router.get("/capture", dependencies=[require(Action.PAIR)])
 def show_capture(request: Request, settings: Config) -> Response:
-    """Pair, place the sensors, record; knows no patient before the code is entered."""
+    """Pair, place the sensors, record; contains no patient data before the code is entered."""
     context = {
         "film_bits_per_s": FILM_BITS_PER_S,
         "film_limit_bytes": settings.max_file_bytes,

@@ -1,4 +1,4 @@
-"""The live pages: the screen of the therapist and that of the patient; what moves comes by the feed."""
+"""Live pages for therapist and patient; dynamic content arrives through the feed."""
 
 from __future__ import annotations
 
@@ -46,41 +46,41 @@ Therapist = Annotated[Identity, require(Action.RUN_LIVE)]
 
 
 @router.get("/sessions/{sid}/live")
-def show_live(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
-    """Pair the tablet, calibrate, watch the walk and steer the feedback."""
+def show_live(request: Request, db: Db, sid: Id, user: Therapist) -> Response:
+    """Pair the tablet, calibrate, monitor the walk and control the feedback."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_live(c, session, patient, capture=str(request.base_url) + "capture")
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "live.html", "patients", session=session, patient=patient, **view)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "live.html", "patients", session=session, patient=patient, **view)
 
 
 @router.get("/sessions/{sid}/live/patient")
-def show_patient_screen(request: Request, db: Db, sid: Id, who: Therapist) -> Response:
-    """One target and one picture, for the person who walks."""
+def show_patient_screen(request: Request, db: Db, sid: Id, user: Therapist) -> Response:
+    """Screen for the walking patient: one target and one picture."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
         view = view_patient_screen(c, session)
-    record_opening(request, who, "session", sid)
+    record_opening(request, user, "session", sid)
     return render_page(
-        request, db, who, "live-patient.html", "patients", session=session, patient=patient, **view
+        request, db, user, "live-patient.html", "patients", session=session, patient=patient, **view
     )
 
 
 def view_live(c: Connection, session: Session, patient: Patient, *, capture: str) -> dict[str, Any]:
-    """The therapist's page; `capture` = address of the page the tablet opens."""
-    shown = [v for v in VARIABLES if v.name in JOINTS]
+    """Template context of the therapist's page; `capture` = URL of the tablet's page."""
+    variables = [v for v in VARIABLES if v.name in JOINTS]
     return {
         "capture": capture,
         "only_here": urlsplit(capture).hostname in LOOPBACK,
         "protocol": PROTOCOL_NAMES.get(session.protocol, session.protocol),
-        "joints": [(v.name, JOINTS[v.name]) for v in shown],
+        "joints": [(v.name, JOINTS[v.name]) for v in variables],
         "live": {
             "session": session.id,
             "patient": patient.id,
-            "variables": [_variable(v) for v in shown],
+            "variables": [_variable(v) for v in variables],
             "segments": SEGMENT_NAMES,
             "terms": list_terms(),
             "choices": UNPRESCRIBED,
@@ -91,7 +91,7 @@ def view_live(c: Connection, session: Session, patient: Patient, *, capture: str
 
 
 def view_patient_screen(c: Connection, session: Session) -> dict[str, Any]:
-    """Page of the patient's screen."""
+    """Template context of the patient's screen."""
     return {
         "live": {
             "session": session.id,
@@ -103,7 +103,7 @@ def view_patient_screen(c: Connection, session: Session) -> dict[str, Any]:
 
 
 def _prescribed(c: Connection, patient_id: str) -> dict[str, Any] | None:
-    """What the prescription in force says, None without one."""
+    """Prescription in force as JSON, None without one."""
     written = prescriptions.in_force(c, patient_id)
     return None if written is None else written.content.to_json()
 
@@ -120,7 +120,7 @@ def _variable(v: Variable) -> dict[str, Any]:
 
 
 def list_terms() -> dict[str, Any]:
-    """The catalogue of parameters as the live pages read it."""
+    """Catalogue of parameters for the live pages."""
     return {
         e.name: {
             "label": e.label,
@@ -135,7 +135,7 @@ def list_terms() -> dict[str, Any]:
 
 
 def view_guided_test(session: Session, patient: Patient) -> dict[str, Any] | None:
-    """What the page knows of a guided test before it begins; None of other sessions."""
+    """Template context of a guided test before it begins; None for other sessions."""
     total = TOTAL.get(session.protocol)
     if total is None:
         return None

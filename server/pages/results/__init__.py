@@ -1,1 +1,1 @@
-"""Pages of analyses and what is read from them."""
+"""Pages of analyses and their results."""

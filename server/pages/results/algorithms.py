@@ -1,4 +1,4 @@
-"""The same take through several orientation filters: choose, run, see how far they are apart."""
+"""Comparison of orientation filters on a trial: selection, progress and differences."""
 
 from __future__ import annotations
 
@@ -52,42 +52,42 @@ def show_algorithms(
     db: Db,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     run: Word = None,
     over: Literal["cycle", "time"] = "cycle",
     of: Word = None,
     against: Word = None,
 ) -> Response:
-    """Choose filters, run them, see their spread and how they agree.
+    """Select filters, run them, and view their spread and agreement.
 
     Parameters
     ----------
-    run : which comparison, else the newest. of : segment or joint angle held against the reference.
-    against : filter whose plot is drawn.
+    run : comparison to show, default the newest. of : segment or joint angle compared with the reference.
+    against : filter to plot.
     """
     with db.read() as c:
         context = read_context(c, sid)
         if elsewhere := lead_to_days(context):
             return elsewhere
         context |= list_choices(c, sid)
-        found = filter_runs.of_session(c, sid)
-    shown = next((r for r in found if r.id == run), found[0] if found else None)
-    if shown is not None:
-        content = filter_runs.file_bytes(blobs, shown, NAME)
+        runs = filter_runs.of_session(c, sid)
+    selected = next((r for r in runs if r.id == run), runs[0] if runs else None)
+    if selected is not None:
+        content = filter_runs.file_bytes(blobs, selected, NAME)
         context["view"] = view_comparison(content, over, of, against)
-        context["run"] = shown
-        context["chosen"] = shown.settings["filters"]
+        context["run"] = selected
+        context["chosen"] = selected.settings["filters"]
         context["files"] = [
-            {"name": name, "what": FILE_WORDS.get(name, ""), "href": _href(shown.id, name)}
-            for name in shown.files
+            {"name": name, "what": FILE_WORDS.get(name, ""), "href": _href(selected.id, name)}
+            for name in selected.files
         ]
-    context["runs"] = found
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "algorithms.html", "patients", **context)
+    context["runs"] = runs
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "algorithms.html", "patients", **context)
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
-    """What the form offers, and the comparison that is at work or failed last."""
+    """Options of the form, and the running or last failed comparison."""
     newest = next(iter(jobs.of_session(c, session_id, kind=COMPARE_FILTERS)), None)
     return {
         "analysed": analyses.latest(c, session_id) is not None,

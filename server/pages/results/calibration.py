@@ -1,4 +1,4 @@
-"""How good the calibration of a take is: every check of every sensor, why, and what to do."""
+"""Calibration quality of a trial: all checks of all sensors, with reasons and remedies."""
 
 from __future__ import annotations
 
@@ -26,20 +26,20 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 @router.get("/sessions/{sid}/calibration")
 def show_calibration(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_RESULT)]
+    request: Request, db: Db, blobs: Blobs, sid: Id, user: Annotated[Identity, require(Action.READ_RESULT)]
 ) -> Response:
-    """The picture of the body, the verdict, and the checks of every sensor."""
+    """Body diagram, overall result, and checks of every sensor."""
     with db.read() as c:
         context = read_context(c, sid)
         if elsewhere := lead_to_days(context):
             return elsewhere
-        found = analyses.latest(c, sid)
-    stored = {} if found is None else json.loads(analyses.file_bytes(blobs, found, "analysis.json"))
-    context["analysed"] = found is not None
+        record = analyses.latest(c, sid)
+    stored = {} if record is None else json.loads(analyses.file_bytes(blobs, record, "analysis.json"))
+    context["analysed"] = record is not None
     context["view"] = view_calibration_checks(
         stored.get("calibration_score"), stored.get("calibration"), read_warnings(stored) if stored else ()
     )
     context["lengths"] = view_lengths(stored.get("body"))
     context["places"] = view_sensor_places(stored.get("sensor_places"))
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "calibration.html", "patients", **context)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "calibration.html", "patients", **context)

@@ -22,7 +22,7 @@ KEY_HEIGHT: Final = 186
 
 
 def caption_chart(panel: CurvePanel, svg: str) -> dict[str, Any]:
-    """A drawn panel with its captions."""
+    """A rendered chart with its captions."""
     return {
         "name": panel.variable.name,
         "title": panel.variable.label,
@@ -34,10 +34,10 @@ def caption_chart(panel: CurvePanel, svg: str) -> dict[str, Any]:
 
 
 def draw_chart(panel: CurvePanel, height: int, *, x_unit: bool, glance: bool = False) -> dict[str, Any]:
-    """Draw a panel `height` px high, with or without the unit of its x axis, and caption it.
+    """Render a chart `height` px high, with or without the unit of its x axis, and its captions.
 
     Parameters
     ----------
-    glance : for a first look: single strides coarsely.
+    glance : draw single strides at low resolution.
     """
     return caption_chart(panel, cycle_svg(panel, height=height, x_unit=x_unit, glance=glance))

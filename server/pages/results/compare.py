@@ -1,4 +1,4 @@
-"""Two visits side by side."""
+"""Comparison of two visits."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ Ticked = Annotated[list[Annotated[str, Query(pattern=HEX_ID)]], Query(max_length
 
 
 @router.get("/patients/{pid}/compare")
-def choose_visits(db: Db, pid: Id, who: ResultReader, visit: Ticked) -> Response:
-    """Go on to the comparison of the two visits that were ticked, or back when they are not two."""
+def choose_visits(db: Db, pid: Id, user: ResultReader, visit: Ticked) -> Response:
+    """Redirect to the comparison of two selected visits, or back if not exactly two are selected."""
     with db.read() as c:
         patients.get(c, pid)
     to = f"/sessions/{visit[0]}/compare/{visit[1]}" if len(set(visit)) == 2 else f"/patients/{pid}"
@@ -49,37 +49,42 @@ def show_comparison(
     reviewed: Reviewed,
     sid: Id,
     other: Id,
-    who: ResultReader,
+    user: ResultReader,
 ) -> Response:
-    """Two sessions: curves over one another, every figure before and after, in words."""
+    """Two sessions: overlaid curves, all parameters before and after, summary in words."""
     with db.read() as c:
-        found = comparisons.pair(c, sid, other)
-    record_opening(request, who, "session", found.before.session.id)
-    record_opening(request, who, "session", found.after.session.id)
-    view = view_comparison(reviewed, found)
+        session_pair = comparisons.pair(c, sid, other)
+    record_opening(request, user, "session", session_pair.before.session.id)
+    record_opening(request, user, "session", session_pair.after.session.id)
+    view = view_comparison(reviewed, session_pair)
     return render_page(
-        request, db, who, "compare.html", "patients", patient=found.patient, pair=found, compare=view
+        request,
+        db,
+        user,
+        "compare.html",
+        "patients",
+        patient=session_pair.patient,
+        pair=session_pair,
+        compare=view,
     )
 
 
-def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str, Any]:
-    """The comparison page: charts with the earlier means behind, the table under its headings, sources."""
-    rows = comparisons.compare_sessions(reviewed, found)
-    _, old = reports.read(
-        reviewed, found.before.found, found.before.edits, found.patient, found.before.session
-    )
-    _, new = reports.read(reviewed, found.after.found, found.after.edits, found.patient, found.after.session)
+def view_comparison(reviewed: ReviewedAnalyses, pair: SessionPair) -> dict[str, Any]:
+    """Template context: charts with earlier means, table with headings, sources."""
+    rows = comparisons.compare_sessions(reviewed, pair)
+    _, old = reports.read(reviewed, pair.before.found, pair.before.edits, pair.patient, pair.before.session)
+    _, new = reports.read(reviewed, pair.after.found, pair.after.edits, pair.patient, pair.after.session)
     last_row = len(new.panels) - COLUMNS
     charts, drawn = [], []
-    for i, (before, after) in enumerate(zip(old.panels, new.panels, strict=True)):
-        below = i >= last_row
-        earlier, panel = same_zero(before, after)
+    for i, (earlier_panel, later) in enumerate(zip(old.panels, new.panels, strict=True)):
+        is_last_row = i >= last_row
+        earlier, panel = same_zero(earlier_panel, later)
         svg = cycle_svg(
-            panel, height=PAGE_HEIGHTS[below], x_unit=below, single_strides=False, earlier=earlier
+            panel, height=PAGE_HEIGHTS[is_last_row], x_unit=is_last_row, single_strides=False, earlier=earlier
         )
         charts.append({**caption_chart(panel, svg), "gone": _gone(earlier)})
         drawn.append(panel)
-    shown = replace(new, panels=tuple(drawn))
+    merged = replace(new, panels=tuple(drawn))
     groups: dict[str, list[ComparedRow]] = {}
     for row in rows:
         groups.setdefault(row.group, []).append(row)
@@ -101,10 +106,10 @@ def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str,
         "real": real,
         "within": facts.within,
         "unjudged": facts.unjudged,
-        "comparable": found.comparable,
-        "cautions": found.cautions,
-        "replay": shown.replay,
-        "figure": all("poses.parquet" in a.found.files for a in (found.before, found.after)),
+        "comparable": pair.comparable,
+        "cautions": pair.cautions,
+        "replay": merged.replay,
+        "figure": all("poses.parquet" in a.found.files for a in (pair.before, pair.after)),
         "used": {"before": old.used, "after": new.used},
         "norm_source": next((p.norm.source for p in drawn if p.norm is not None), None),
         "at_speed": any(p.comfortable is not None for p in drawn),
@@ -114,7 +119,7 @@ def view_comparison(reviewed: ReviewedAnalyses, found: SessionPair) -> dict[str,
 
 
 def _pairs(rows: Sequence[ComparedRow]) -> list[tuple[ComparedRow, int]]:
-    """Rows with how many share their title: the number on the first of them, 0 on the others."""
+    """Rows with the number of rows that share their title on the first of them, 0 on the others."""
     names = [r.change.name for r in rows]
     return [
         (r, names.count(name) if names.index(name) == i else 0)

@@ -1,4 +1,4 @@
-"""Daily life on the session page and in the week report, and beside the clinic's walks on the trends page."""
+"""Template context of daily life for session page, week report and trends page."""
 
 from __future__ import annotations
 
@@ -24,24 +24,26 @@ TEMPLATES: Final = {"session.html": "daily.html", "print.html": "daily-print.htm
 
 
 def draw_daily(view: DailyLifeView | None) -> dict[str, Any] | None:
-    """What the templates of daily life show, with the charts drawn."""
+    """Template context of daily life, with charts rendered."""
     if view is None:
         return None
-    found = view.found
+    result = view.found
     days = [
-        {"totals": d, "ribbon": ribbon_svg(found, d), "lean": inclination_svg(found, d)} for d in view.days
+        {"totals": d, "ribbon": ribbon_svg(result, d), "lean": inclination_svg(result, d)} for d in view.days
     ]
-    there = [k for k in KINDS if found.minutes(k) > 0.0]
+    kinds_present = [k for k in KINDS if result.minutes(k) > 0.0]
     return {
         "view": view,
         "days": days,
         "sheets": [days[i : i + DAYS_A_SHEET] for i in range(0, len(days), DAYS_A_SHEET)],
-        "legend": [(kind_swatch(k), KIND_LABELS[k]) for k in there],
-        "definitions": [(KIND_LABELS[k], KIND_WORDS[k], format_hours(found.minutes(k))) for k in there],
+        "legend": [(kind_swatch(k), KIND_LABELS[k]) for k in kinds_present],
+        "definitions": [
+            (KIND_LABELS[k], KIND_WORDS[k], format_hours(result.minutes(k))) for k in kinds_present
+        ],
         "bouts": bouts_svg(view.bins),
-        "steps": steps_svg(found, view.days),
+        "steps": steps_svg(result, view.days),
         "steps_title": "Steps per day" if len(days) > 1 else "Steps per hour",
-        "stairs": any(found.minutes(k) for k in ("stairs_up", "stairs_down")),
+        "stairs": any(result.minutes(k) for k in ("stairs_up", "stairs_down")),
         "worn_h": f"{WORN_H:.0f}",
         "events_shown": EVENTS_SHOWN,
     }

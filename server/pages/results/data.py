@@ -1,4 +1,4 @@
-"""Downloads, the health of the estimator, provenance, running again."""
+"""Downloads, state of the estimator, provenance, and repeated analysis."""
 
 from __future__ import annotations
 
@@ -54,30 +54,30 @@ FILE_WORDS: Final[Mapping[str, str]] = {
 
 @router.get("/sessions/{sid}/data")
 def show_data(
-    request: Request, db: Db, blobs: Blobs, sid: Id, who: Annotated[Identity, require(Action.READ_SESSION)]
+    request: Request, db: Db, blobs: Blobs, sid: Id, user: Annotated[Identity, require(Action.READ_SESSION)]
 ) -> Response:
-    """Downloads, the estimator's health, provenance, running again."""
+    """Downloads, state of the estimator, provenance, and repeated analysis."""
     with db.read() as c:
         context = read_context(c, sid)
-        context |= list_downloads(c, blobs, sid, results=who.may(Action.READ_RESULT))
+        context |= list_downloads(c, blobs, sid, results=user.may(Action.READ_RESULT))
         context["exports"] = _list_exports(c, context)
-        seen = who.may(Action.READ_RESULT) and context["session"].has_video
-        context["video"] = videos.find(c, sid) if seen else None
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "data.html", "patients", **context)
+        with_video = user.may(Action.READ_RESULT) and context["session"].has_video
+        context["video"] = videos.find(c, sid) if with_video else None
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "data.html", "patients", **context)
 
 
 def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results: bool) -> dict[str, Any]:
-    """Files to download, estimator, sensor checks, provenance and the mapping behind the shown analysis."""
+    """Template context: files, estimator, sensor checks, provenance and mapping of the displayed analysis."""
     this = recordings.current(c, session_id)
-    found = analyses.of_session(c, session_id) if results else []
-    shown = found[0] if found else None
-    stored = {} if shown is None else json.loads(analyses.file_bytes(blobs, shown, "analysis.json"))
-    files = [] if shown is None else [(shown.id, name, blob.size) for name, blob in shown.files.items()]
+    records = analyses.of_session(c, session_id) if results else []
+    record = records[0] if records else None
+    stored = {} if record is None else json.loads(analyses.file_bytes(blobs, record, "analysis.json"))
+    files = [] if record is None else [(record.id, name, blob.size) for name, blob in record.files.items()]
     return {
-        "analysis": shown,
-        "files_changed": shown is not None and this is not None and shown.recording_id != this.id,
-        "archive": None if shown is None else f"/api/v1/sessions/{session_id}/archive.zip",
+        "analysis": record,
+        "files_changed": record is not None and this is not None and record.recording_id != this.id,
+        "archive": None if record is None else f"/api/v1/sessions/{session_id}/archive.zip",
         "estimator": estimator_view(stored.get("estimator")),
         "sensors": sensor_checks(stored.get("agreement")),
         "earlier": [
@@ -85,9 +85,9 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
                 "id": a.id,
                 "created_at": a.created_at,
                 "estimator": _asked_for(a.config),
-                "again": _ask_again(this, shown, a),
+                "again": _ask_again(this, record, a),
             }
-            for a in found[1:]
+            for a in records[1:]
         ],
         "results": [
             {
@@ -103,18 +103,18 @@ def list_downloads(c: Connection, blobs: BlobStore, session_id: str, *, results:
             {**vars(f), "href": f"/api/v1/sessions/{session_id}/files/{quote(f.name)}" if results else None}
             for f in (this.files if this else ())
         ],
-        "provenance": _provenance(shown) if shown else [],
-        "mapping": _mapping(shown.manifest if shown else None),
+        "provenance": _provenance(record) if record else [],
+        "mapping": _mapping(record.manifest if record else None),
     }
 
 
 def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The formats for other programs: to download, at work, or to be asked for; none without an analysis."""
-    shown = context["analysis"]
-    if shown is None:
+    """Export formats: available, in progress, or to be requested; none without an analysis."""
+    record = context["analysis"]
+    if record is None:
         return []
-    offers = exports.list_offers(c, context["patient"], context["session"], shown)
-    found = [
+    offers = exports.list_offers(c, context["patient"], context["session"], record)
+    views = [
         {
             **vars(offer),
             "job": None if offer.job is None else view_job(offer.job),
@@ -122,8 +122,8 @@ def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, A
         }
         for offer in offers
     ]
-    follow_few([offer["job"] for offer in found])
-    return found
+    follow_few([offer["job"] for offer in views])
+    return views
 
 
 def _describe_file(name: str) -> str:
@@ -134,13 +134,15 @@ def _describe_file(name: str) -> str:
 
 def _ask_again(
     this: recordings.StoredRecording | None,
-    shown: analyses.AnalysisRecord | None,
+    record: analyses.AnalysisRecord | None,
     earlier: analyses.AnalysisRecord,
 ) -> dict[str, Any] | None:
-    """What asks for an earlier set-up of the same files again; None where it is that of the shown one."""
-    if this is None or shown is None or earlier.recording_id != this.id:
+    """Request for restoring an earlier setup of the same files; None if it is that of the displayed
+    analysis.
+    """
+    if this is None or record is None or earlier.recording_id != this.id:
         return None
-    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, shown.manifest):
+    if repairs.take_setup(None, earlier.manifest) == repairs.take_setup(None, record.manifest):
         return None
     return {
         "manifest": repairs.take_setup(this.manifest, earlier.manifest),
@@ -149,17 +151,17 @@ def _ask_again(
 
 
 def _asked_for(config: Mapping[str, Any]) -> str | None:
-    """The estimator somebody chose by name."""
-    asked = (config.get("poses") or {}).get("estimator")
-    return None if asked is None else choice_label(asked)
+    """Label of the estimator chosen by the user, None if automatic."""
+    name = (config.get("poses") or {}).get("estimator")
+    return None if name is None else choice_label(name)
 
 
-def _provenance(shown: analyses.AnalysisRecord) -> list[tuple[str, str]]:
+def _provenance(record: analyses.AnalysisRecord) -> list[tuple[str, str]]:
     return [
-        ("Input sha256", shown.input_sha256),
-        ("Settings sha256", shown.config_sha256),
-        ("Version", shown.code_version),
-        ("Analysis", shown.id),
+        ("Input sha256", record.input_sha256),
+        ("Settings sha256", record.config_sha256),
+        ("Version", record.code_version),
+        ("Analysis", record.id),
     ]
 
 

@@ -1,4 +1,4 @@
-"""The figure as drawings: in the middle of the walk for paper, and where the replay begins."""
+"""Drawings of the avatar: mid-walk for print, and at the start of the replay."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ MOST_FRAMES: Final = 120_000
 def draw_contact(
     reviewed: ReviewedAnalyses, this: AnalysedSession, strides: Strides, patient: Patient
 ) -> dict[str, str] | None:
-    """The figure at a contact in the middle of the walk, with its caption; None where it has no poses."""
+    """The avatar at a contact in the middle of the walk, with its caption; None without poses."""
     if "poses.parquet" not in this.found.files:
         return None
-    counted = [s for s in strides.strides if s.excluded_reason is None]
-    mine = [s for s in counted if s.side == patient.affected_side] or counted
+    included = [s for s in strides.strides if s.excluded_reason is None]
+    mine = [s for s in included if s.side == patient.affected_side] or included
     middle = mine[len(mine) // 2]
     caption = f"Contact, {middle.side} foot"
     poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
@@ -43,9 +43,9 @@ def draw_contact(
 def draw_beginning(
     reviewed: ReviewedAnalyses, this: AnalysedSession, model: ReportModel
 ) -> dict[str, str] | None:
-    """What the replay will show first, where the page's clock begins, and the client that will show it.
+    """First frame of the replay, start time of the page's clock, and the client's URL.
 
-    None where there is nothing to draw; damaged poses hide no number of the page.
+    None if there is nothing to draw; damaged poses do not affect other content of the page.
     """
     if "poses.parquet" not in this.found.files:
         return None

@@ -1,4 +1,4 @@
-"""What has room on the first sheet of paper beside what always stands there."""
+"""Layout of the first printed page: optional content that fits."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ HALF: Final = 48
 
 
 def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) -> bool:
-    """Whether the profile stands on the first sheet, beside the therapist's text.
+    """Whether the movement profile fits on the first page, next to the therapist's text.
 
-    Counted in lines, as the widest of the fonts and the longest of the languages fill them.
+    Counts lines for the widest font and the longest language.
     """
     headline = report["headline"]
     if headline is None or report["score"] is None or len(report["bars"]) > MOST_BARS:

@@ -1,4 +1,4 @@
-"""The page that opens a number: its definition, its strides, and the way to their moments."""
+"""Page of one parameter: definition, strides, and links to their times."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def show_parameter(
     reviewed: Reviewed,
     sid: Id,
     name: Annotated[str, Path(pattern=r"^[a-z0-9_]{1,64}$")],
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """One parameter of a session with every stride behind it."""
+    """One parameter of a session with all its strides."""
     with db.read() as c:
         context = read_measured_context(c, sid)
-        found = analyses.get_shown(c, sid)
-        edits = edit_log.edits_of(c, found.id)
+        record = analyses.get_shown(c, sid)
+        edits = edit_log.edits_of(c, record.id)
     number = reports.behind_number(
-        reviewed, found, edits, context["patient"], context["session"], name, context["controls"]
+        reviewed, record, edits, context["patient"], context["session"], name, context["controls"]
     )
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "parameter.html", "patients", number=number, **context)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "parameter.html", "patients", number=number, **context)

@@ -1,4 +1,4 @@
-"""One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
+"""Patient page: identity, programme, five key parameters, visits with their trials, notes."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def show_patient(
     reviewed: Reviewed,
     settings: Config,
     pid: Id,
-    who: Annotated[Identity, require(Action.READ_PATIENT)],
+    user: Annotated[Identity, require(Action.READ_PATIENT)],
 ) -> Response:
-    """One patient: who, the programme, how it goes in five figures, visits with their takes, notes."""
-    results = who.may(Action.READ_RESULT)
+    """Patient page: identity, programme, five key parameters, visits with their trials, notes."""
+    results = user.may(Action.READ_RESULT)
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
@@ -71,8 +71,8 @@ def show_patient(
         written_down = notes.of_patient(c, pid)
         agreed = consents.of_patient(c, pid)
         written = prescriptions.of_patient(c, pid) if results else []
-        team = view_team(c, who, pid)
-    record_opening(request, who, "patient", pid)
+        team = view_team(c, user, pid)
+    record_opening(request, user, "patient", pid)
     trend = None
     if results:
         trained = next((w.content for w in written if w.ended_at is None), None)
@@ -81,10 +81,10 @@ def show_patient(
             trend = draw_figures(history, None if trained is None else trained.parameter)
     walked = histories.baseline([a for a in done if a.session.protocol in sessions.WALKS])
     return render_page(
-        request, db, who, "patient.html", "patients",
+        request, db, user, "patient.html", "patients",
         patient=view_patient(patient), visits=rows, today=now().date(),
         facts=list_facts(patient, None if walked is None else walked.condition.words),
-        notes=list_notes(written_down, rows, who),
+        notes=list_notes(written_down, rows, user),
         consents=[(one, PURPOSE_WORDS[one.purpose]) for one in agreed], purposes=list(PURPOSE_WORDS.items()),
         programme=view_programme(plans[0], now().date()) if plans else None,
         team=team, trend=trend, comparable=len(done) > 1 and results, feedback=make_card(written),
@@ -92,8 +92,8 @@ def show_patient(
     )  # fmt: skip
 
 
-def view_team(c: Connection, who: Identity, patient_id: str) -> dict[str, Any] | None:
-    """The care team and who opened the patient in an emergency; None where the clinic has no teams."""
+def view_team(c: Connection, user: Identity, patient_id: str) -> dict[str, Any] | None:
+    """Care team and emergency access; None if the clinic has no care teams."""
     if not care_teams.are_on(c):
         return None
     people = care_teams.list_people(c, patient_id)
@@ -101,14 +101,14 @@ def view_team(c: Connection, who: Identity, patient_id: str) -> dict[str, Any] |
         "members": [one for one, is_in in people if is_in],
         "choices": people,
         "emergencies": [
-            (one, one.is_open and care_teams.may_end(one, who))
+            (one, one.is_open and care_teams.may_end(one, user))
             for one in care_teams.list_accesses(c, patient_id)
         ],
     }
 
 
 def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, str]]:
-    """Who it is and how the person walks, in a line."""
+    """One-line summary of the patient and usual walking condition."""
     facts = [
         ("Note", patient.note),
         ("Affected side", patient.affected_side or ""),
@@ -120,27 +120,27 @@ def list_facts(patient: patients.Patient, walks: str | None) -> list[tuple[str, 
 
 
 def list_notes(
-    written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]], who: Identity
+    written: Sequence[notes.PatientNote], rows: Sequence[Mapping[str, Any]], user: Identity
 ) -> list[dict[str, Any]]:
-    """Notes about the patient and those of visits, the latest day first."""
-    writes, others = who.may(Action.WRITE_PATIENT), who.may(Action.MANAGE_USERS)
-    found: list[dict[str, Any]] = [
+    """Notes about the patient and notes of visits, latest date first."""
+    writes, may_edit_all = user.may(Action.WRITE_PATIENT), user.may(Action.MANAGE_USERS)
+    entries: list[dict[str, Any]] = [
         {
             "id": n.id,
             "day": n.written_on,
             "by": n.by,
             "text": n.content,
-            "removable": writes and notes.may_remove(n, who, of_others=others),
+            "removable": writes and notes.may_remove(n, user, of_others=may_edit_all),
         }
         for n in written
     ]
-    found += [
+    entries += [
         {"id": None, "day": row["day"], "visit": take["title"], "href": take["href"], "text": take["note"]}
         for row in rows
         for take in row["takes"]
         if take["note"]
     ]
-    return sorted(found, key=lambda n: n["day"], reverse=True)
+    return sorted(entries, key=lambda n: n["day"], reverse=True)
 
 
 def list_visits(
@@ -150,37 +150,39 @@ def list_visits(
     done: Sequence[AnalysedSession],
     planned: Mapping[str, PlannedVisit],
 ) -> list[dict[str, Any]]:
-    """The visits of a patient, newest first, each with its takes; what is not analysed is a visit of its own.
+    """Visits of a patient, newest first, with their trials; unanalysed sessions are separate visits.
 
     Parameters
     ----------
-    done : what is analysed, oldest first; empty for who may not see results. planned : session → the visit
-        of a programme that it was.
+    done : analysed sessions, oldest first; empty for users without access to results.
+    planned : session → its planned visit.
     """
     takes_now = {take.session_id: describe_live(take) for take in live.list_running(c)}
     running = find_active_jobs(c, [patient_id], lambda j: j.session_id)
-    found = {a.session.id: a for a in done}
+    by_session = {a.session.id: a for a in done}
     kinds = {key: v.kind for key, v in planned.items()}
     edits = edit_log.edits_of_all(c, [a.found.id for a in done])
     grouped = visits.group_takes(done)
     measured = {id(v): _measure(reviewed, v) for v in grouped}
     scale = find_scale([p for speeds in measured.values() if speeds for p in speeds.takes])
     rows: list[dict[str, Any]] = []
-    shown: set[str] = set()
+    listed: set[str] = set()
     for s in sessions.of_patient(c, patient_id):
-        if s.id in shown:
+        if s.id in listed:
             continue
         visit = next((v for v in grouped if s.id in {t.session.id for t in v.takes}), None)
         mine = [s] if visit is None else [t.session for t in reversed(visit.takes)]
-        shown.update(m.id for m in mine)
+        listed.update(m.id for m in mine)
         takes = [
             {
                 **vars(m),
                 "href": f"/sessions/{m.id}{_find_page(m, live=m.id in takes_now)}",
                 "live": takes_now.get(m.id),
-                "analysed": m.id in found,
+                "analysed": m.id in by_session,
                 "job": running.get(m.id),
-                "status": judge_visit(reviewed, m, found[m.id].found if m.id in found else None, edits),
+                "status": judge_visit(
+                    reviewed, m, by_session[m.id].found if m.id in by_session else None, edits
+                ),
                 "speed": None,
             }
             for m in mine
@@ -195,15 +197,15 @@ def list_visits(
         if visit is not None:
             row["condition"] = visit.condition.words
             row |= _view_speed(visit, grouped, measured, kinds, scale)
-            for take, alone in zip(takes, reversed(row["speeds"]), strict=True):
-                take["speed"] = alone
+            for take, speed in zip(takes, reversed(row["speeds"]), strict=True):
+                take["speed"] = speed
         rows.append(row)
     follow_few([take["job"] for row in rows for take in row["takes"]])
     return rows
 
 
 def _measure(reviewed: ReviewedAnalyses, visit: ClinicVisit) -> TakesFigure | None:
-    """The walking speed of every take and their mean; None where it cannot be read or was not measured."""
+    """Gait speed of every trial and their mean; None if unreadable or not measured."""
     try:
         return visits.measure_visit(reviewed, visit).get((SPEED, None))
     except UNREADABLE:
@@ -217,7 +219,7 @@ def _view_speed(
     planned: Mapping[str, VisitKind],
     scale: tuple[float, float] | None,
 ) -> dict[str, Any]:
-    """Speed of a visit with that of its takes, and its change since the visit it is compared with."""
+    """Gait speed of a visit and its trials, and the change since the visit used for comparison."""
     own = measured[id(visit)]
     by_take = {} if own is None else own.by_take
     view: dict[str, Any] = {
@@ -227,15 +229,17 @@ def _view_speed(
         "compared": "not compared" if visit.condition.feedback else "first in this condition",
     }
     if own is not None and scale is not None and own.mean.mean is not None:
-        said = ", ".join(text for text in view["speeds"] if text)
-        view["figure"] = takes_svg(own.takes, own.mean, scale, f"Takes {said}, mean {view['speed']} m/s")
-    before = visits.find_before(grouped, visit, planned)
-    if before is not None:
-        earlier = measured[id(before)]
+        text_speeds = ", ".join(text for text in view["speeds"] if text)
+        view["figure"] = takes_svg(
+            own.takes, own.mean, scale, f"Takes {text_speeds}, mean {view['speed']} m/s"
+        )
+    previous = visits.find_before(grouped, visit, planned)
+    if previous is not None:
+        earlier = measured[id(previous)]
         view["compared"] = "speed not measured in both"
         if own is not None and earlier is not None:
             change = parameter_changes([earlier.mean], [own.mean])[0]
-            view |= {"change": change_words(change), "compared": None, "since": before.day}
+            view |= {"change": change_words(change), "compared": None, "since": previous.day}
     return view
 
 
@@ -244,7 +248,7 @@ def _print(p: Parameter | None) -> str | None:
 
 
 def _find_page(s: sessions.Session, *, live: bool) -> str:
-    """The page of a session on which there is something to do."""
+    """The page of a session that requires action."""
     if live:
         return "/live"
     return "/upload" if s.state in {"empty", "uploaded"} else ""

@@ -1,4 +1,4 @@
-"""The page on which feedback is prescribed, and the card of a patient."""
+"""Page for prescribing feedback, and prescription card of a patient."""
 
 from __future__ import annotations
 
@@ -47,11 +47,11 @@ SOURCES: Final = (
 
 @dataclass(frozen=True)
 class PrescriptionPreset:
-    """What is prescribed most often, in one choice.
+    """A frequently used prescription.
 
     Parameters
     ----------
-    parameter, modes : of the prescription. sources : of the target, the first that gives numbers is taken.
+    parameter, modes : of the prescription. sources : of the target; the first available one is used.
     """
 
     key: str
@@ -81,7 +81,7 @@ PRESETS: Final = (
 
 @dataclass(frozen=True)
 class PrescriptionCard:
-    """The prescription in force, in words, and the ones that ended, newest first."""
+    """The prescription in force, in words, and earlier ones, newest first."""
 
     now: PatientPrescription | None
     title: str
@@ -91,7 +91,7 @@ class PrescriptionCard:
 
 @dataclass(frozen=True)
 class TrainableParameter:
-    """A parameter that can be trained."""
+    """A parameter available for training."""
 
     name: str
     label: str
@@ -102,22 +102,22 @@ class TrainableParameter:
 
 @router.get("/patients/{pid}/prescription")
 def show_prescription(
-    request: Request, db: Db, pid: Id, who: Annotated[Identity, require(Action.RUN_LIVE)]
+    request: Request, db: Db, pid: Id, user: Annotated[Identity, require(Action.RUN_LIVE)]
 ) -> Response:
-    """Write a prescription, filled with the one in force."""
+    """Form for a prescription, filled with the one in force."""
     with db.read() as c:
         patient = patients.get(c, pid)
         now = prescriptions.in_force(c, pid)
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     return render_page(
-        request, db, who, "prescription.html", "patients",
+        request, db, user, "prescription.html", "patients",
         patient=patient, now=now, f=fill_form(now, patient.affected_side),
         groups=group_trainable(), modes=MODES, sources=SOURCES, presets=PRESETS,
     )  # fmt: skip
 
 
 def make_card(written: Sequence[PatientPrescription]) -> PrescriptionCard:
-    """The card of a patient's page."""
+    """Prescription card for a patient's page."""
     now = next((w for w in written if w.ended_at is None), None)
     lines = () if now is None else tuple(x for x in prescription_words(now.content) if x[0] in ON_CARD)
     return PrescriptionCard(
@@ -129,7 +129,7 @@ def make_card(written: Sequence[PatientPrescription]) -> PrescriptionCard:
 
 
 def group_trainable() -> list[tuple[str, list[TrainableParameter]]]:
-    """What can be trained under the headings of the parameter table."""
+    """Trainable parameters under the headings of the parameter table."""
     groups: dict[str, list[TrainableParameter]] = {}
     for name in list_trainable():
         e = CATALOGUE[name]
@@ -140,7 +140,7 @@ def group_trainable() -> list[tuple[str, list[TrainableParameter]]]:
 
 
 def fill_form(now: PatientPrescription | None, affected: Side | None) -> Prescription:
-    """What the form is filled with: the prescription in force, else the defaults for this person."""
+    """Initial values of the form: the prescription in force, otherwise defaults for this patient."""
     if now is not None:
         return now.content
     return Prescription.from_json({"parameter": FIRST, "side": affected or "left"})

@@ -1,4 +1,4 @@
-"""The profile of a walk as pages show it: the sagittal score and the bars of its curves."""
+"""Movement profile of a walk on pages: sagittal score and bars of the curves."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 def view_profile(
     reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any], bar_height: int
 ) -> tuple[dict[str, Any] | None, list[dict[str, Any]]]:
-    """The sagittal score and the bars of its curves, both with the visit before; None, [] without curves."""
+    """Sagittal score and bars of the curves, with the previous visit; None, [] without curves."""
     if model.profile is None or model.quality.kind == "bad":
         return None, []
-    earlier, before = None, context.get("before")
-    if before is not None and model.since is not None:
-        _, old = reports.read(reviewed, before.found, before.edits, context["patient"], before.session)
+    earlier, previous = None, context.get("before")
+    if previous is not None and model.since is not None:
+        _, old = reports.read(reviewed, previous.found, previous.edits, context["patient"], previous.session)
         earlier = old.profile
-    found = {} if earlier is None else {b.title: b for b in earlier.bars}
+    earlier_bars = {} if earlier is None else {b.title: b for b in earlier.bars}
     bars = [
-        {"title": b.title, "svg": bar_svg(b, found.get(b.title), bar_height), **_print_sides(b)}
+        {"title": b.title, "svg": bar_svg(b, earlier_bars.get(b.title), bar_height), **_print_sides(b)}
         for b in model.profile.bars
     ]
     score = model.profile.score
@@ -48,13 +48,13 @@ def _print_sides(bar: ProfileBar) -> dict[str, str]:
     return {side: format_number(bar.values[side], 1) if side in bar.values else "–" for side in SIDES}
 
 
-def _change_score(before: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
-    """Of each side with both values; no source has a limit for it, so there is no verdict."""
+def _change_score(previous: ProfileBar, now: ProfileBar) -> tuple[ChangeWords, ...]:
+    """Both values of each side; not assessed, as no limit has been published."""
     term = find_term("gps_sagittal_deg")
     return tuple(
         ChangeWords(
-            side, format_difference(now.values[side] - before.values[side], term), "none", NO_LIMIT, ()
+            side, format_difference(now.values[side] - previous.values[side], term), "none", NO_LIMIT, ()
         )
         for side in SIDES
-        if side in now.values and side in before.values
+        if side in now.values and side in previous.values
     )

@@ -1,4 +1,4 @@
-"""Which rows of the parameter table stand where: first, folded, on paper."""
+"""Arrangement of the parameter table: first rows, collapsed groups, printed rows."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ require_entries((*MATTERING, *NOT_ON_PAPER), "sagittal.server.pages.results.repo
 
 
 def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
-    """The ten rows that matter most of what these sensors gave, in fixed order; of squats and tests all.
+    """The ten most important available rows in fixed order; all rows for squats and tests.
 
-    A joint angle is measured from the zero of its curve.
+    Joint angles use the zero of their curve.
     """
     rows = {row.name: row for _, group in model.page_groups for row in group}
     if model.squats is not None:
@@ -63,14 +63,14 @@ def select_first(model: ReportModel) -> tuple[ParameterRow, ...]:
     if model.functional is not None and not model.strides:
         return tuple(row for row in rows.values() if row.group in FUNCTIONAL and row.reason is None)
     from_zero = {level.from_standing(name): row for name, row in rows.items()}
-    found = (from_zero.get(name) or rows.get(name) for name in MATTERING)
-    return tuple(row for row in found if row is not None and row.reason is None)[:FIRST_ROWS]
+    selected = (from_zero.get(name) or rows.get(name) for name in MATTERING)
+    return tuple(row for row in selected if row is not None and row.reason is None)[:FIRST_ROWS]
 
 
 def fold_groups(model: ReportModel, first: Sequence[ParameterRow]) -> list[dict[str, Any]]:
-    """All other rows by group; the head of each says how many are beyond the norm, so that none hides."""
-    shown = {row.name for row in first}
-    groups = ((name, [row for row in rows if row.name not in shown]) for name, rows in model.page_groups)
+    """Remaining rows by group, with the number outside the norm in each heading."""
+    names = {row.name for row in first}
+    groups = ((name, [row for row in rows if row.name not in names]) for name, rows in model.page_groups)
     return [{"name": name, "rows": rows, "words": _count_beyond(rows)} for name, rows in groups if rows]
 
 
@@ -84,9 +84,9 @@ def _count_beyond(rows: Sequence[ParameterRow]) -> str:
 
 
 def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:
-    """The parameter table; empty when not one number was found, because then one sentence says more.
+    """The parameter table; empty if no value is available, since a sentence then replaces it.
 
-    On paper only what was measured has a row; `missing` says the rest in one line.
+    In print, only measured parameters have a row; `missing` lists the others in one line.
     """
     groups = [(name, rows) for name, rows in model.page_groups if name not in SECONDARY]
     if all(row.reason for _, rows in groups for row in rows):
@@ -103,10 +103,10 @@ def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[P
 def select_others(
     model: ReportModel, first: Sequence[ParameterRow]
 ) -> list[tuple[str, tuple[ParameterRow, ...]]]:
-    """The rows of paper that are not among the first ones."""
-    shown = {row.name for row in first}
+    """Printed rows that are not among the first ones."""
+    names = {row.name for row in first}
     short = (
-        (name, tuple(r for r in rows if r.name not in shown))
+        (name, tuple(r for r in rows if r.name not in names))
         for name, rows in select_groups(model, paper=True)
     )
     return [(name, rows) for name, rows in short if rows]

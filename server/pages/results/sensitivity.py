@@ -1,4 +1,4 @@
-"""How sure the angles of squats are: one measure of body or sensors off at a time."""
+"""Uncertainty of squat angles: sensitivity to single body and sensor parameters."""
 
 from __future__ import annotations
 
@@ -38,34 +38,35 @@ def show_sensitivity(
     db: Db,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     run: Annotated[str | None, Query(max_length=100)] = None,
     show: Annotated[str, Query(max_length=20)] = "step",
 ) -> Response:
-    """Start one, follow it, read its tables.
+    """Start a sensitivity analysis, follow its progress, view its tables.
 
     Parameters
     ----------
-    run : which one, else the newest. show : change by steps, by a share of the nominal value, or in %.
+    run : analysis to show, default the newest. show : change per step, per fraction of the nominal value, or
+        in %.
     """
     with db.read() as c:
         context = read_context(c, sid)
         context |= list_choices(c, sid)
-        found = sensitivities.of_session(c, sid)
-        shown = next((r for r in found if r.id == run), found[0] if found else None)
-        kept = None if shown is None else sensitivities.find_file(c, shown)
-    context |= {"runs": found, "run": shown}
-    if shown is not None and kept is not None:
-        analysis, name = kept
+        rows = sensitivities.of_session(c, sid)
+        selected = next((r for r in rows if r.id == run), rows[0] if rows else None)
+        stored = None if selected is None else sensitivities.find_file(c, selected)
+    context |= {"runs": rows, "run": selected}
+    if selected is not None and stored is not None:
+        analysis, name = stored
         context["view"] = view_sensitivity(analyses.file_bytes(blobs, analysis, name), show)
         context["earlier"] = context["analysed"] != analysis.id
-        context["csv"] = f"/api/v1/analyses/{analysis.id}/files/{quote(shown.files[1])}"
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "sensitivity.html", "patients", **context)
+        context["csv"] = f"/api/v1/analyses/{analysis.id}/files/{quote(selected.files[1])}"
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "sensitivity.html", "patients", **context)
 
 
 def list_choices(c: Connection, session_id: str) -> dict[str, Any]:
-    """What the form offers, and the job that is at work or failed last."""
+    """Options of the form, and the running or last failed job."""
     newest = next(iter(jobs.of_session(c, session_id, kind=SENSITIVITY)), None)
     analysed = analyses.latest(c, session_id)
     names = [f.name for f in reference_files.list_files(c, session_id)]

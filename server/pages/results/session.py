@@ -1,4 +1,4 @@
-"""The report of a session: the overview, all curves, and the sheets of paper."""
+"""Report of a session: overview, all curves, and printed pages."""
 
 from __future__ import annotations
 
@@ -101,10 +101,10 @@ def show_overview(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_SESSION)],
+    user: Annotated[Identity, require(Action.READ_SESSION)],
 ) -> Response:
-    """Is the data good, how does this person walk."""
-    return _show_report(request, db, reviewed, sid, who, OVERVIEW)
+    """Data quality and summary of the gait."""
+    return _show_report(request, db, reviewed, sid, user, OVERVIEW)
 
 
 @router.get("/sessions/{sid}/kinematics")
@@ -113,10 +113,10 @@ def show_kinematics(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
     """All cycle curves with the replay."""
-    return _show_report(request, db, reviewed, sid, who, CURVES)
+    return _show_report(request, db, reviewed, sid, user, CURVES)
 
 
 @router.get("/sessions/{sid}/values")
@@ -125,11 +125,13 @@ def show_values(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """All other values by group: a page, and the part of the overview that opens with its first fold."""
+    """All other values by group: a page, and the part of the overview loaded with its first expanded
+    group.
+    """
     template = VALUES if FRAGMENT in request.headers else "values.html"
-    return _show_report(request, db, reviewed, sid, who, template)
+    return _show_report(request, db, reviewed, sid, user, template)
 
 
 @router.get("/sessions/{sid}/print")
@@ -139,16 +141,16 @@ def show_print(
     reviewed: Reviewed,
     settings: Config,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     named: bool = False,
 ) -> Response:
-    """Sheets of A4 for the browser's own print: in short, all values, curves; with the name if asked for."""
-    context = gather_report(db, reviewed, sid, who, PAPER)
+    """A4 pages for the browser's print function: summary, all values, curves; with the name if requested."""
+    context = gather_report(db, reviewed, sid, user, PAPER)
     if context["report"] is None:
         return RedirectResponse(f"/sessions/{sid}", status_code=303)
-    record_opening(request, who, "session", sid)
-    context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
-    return render_sheets(request, who, choose_template(PAPER, context), **context)
+    record_opening(request, user, "session", sid)
+    context |= name_on_paper(request, db, settings, user, context["patient"].id, named=named)
+    return render_sheets(request, user, choose_template(PAPER, context), **context)
 
 
 def _show_report(
@@ -156,22 +158,22 @@ def _show_report(
     db: Database,
     reviewed: ReviewedAnalyses,
     sid: str,
-    who: Identity,
+    user: Identity,
     template: str,
 ) -> Response:
-    context = gather_report(db, reviewed, sid, who, template)
+    context = gather_report(db, reviewed, sid, user, template)
     if template == CURVES and (elsewhere := lead_to_days(context)):
         return elsewhere
     if template == VALUES:
-        state_of(request).trail.record_watched(who, "numbers.opened", "session", sid)
+        state_of(request).trail.record_watched(user, "numbers.opened", "session", sid)
     else:
-        record_opening(request, who, "session", sid)
-    shown = choose_template(template, context)
-    return render_page(request, db, who, shown, "patients", **context)
+        record_opening(request, user, "session", sid)
+    chosen_template = choose_template(template, context)
+    return render_page(request, db, user, chosen_template, "patients", **context)
 
 
 def choose_template(template: str, context: Mapping[str, Any]) -> str:
-    """The template of a page, of daily life its own."""
+    """Template of a page; daily life has its own."""
     is_daily = context["session"].protocol == "activity"
     return daily.TEMPLATES.get(template, template) if is_daily else template
 
@@ -180,15 +182,15 @@ def gather_report(
     db: Database,
     reviewed: ReviewedAnalyses,
     sid: str,
-    who: Identity,
+    user: Identity,
     template: str,
 ) -> dict[str, Any]:
-    """What a page or the sheets of a session's report show; `report` is None where nothing is analysed."""
+    """Template context of a session's report; `report` is None if nothing is analysed."""
     paper = template == PAPER
     with db.read() as c:
         context = read_measured_context(c, sid)
         patient = context["patient"]
-        done = histories.list_analysed(c, patient.id) if who.may(Action.READ_RESULT) else []
+        done = histories.list_analysed(c, patient.id) if user.may(Action.READ_RESULT) else []
         this = next((a for a in done if a.session.id == sid), None)
         if this is not None:
             alike = comparisons.list_comparable(c, this.session, done)
@@ -196,7 +198,7 @@ def gather_report(
             trained = feedback.gather(c, patient, sid, done)
             if template == OVERVIEW and context["session"].has_video:
                 context["video"] = videos.find(c, sid)
-            if not paper and who.may(Action.ANALYSE):
+            if not paper and user.may(Action.ANALYSE):
                 repair = repairs.read_proposal(c, reviewed.blobs, this.found)
                 context["repair"] = repair
                 if this.session.protocol in TEST_NAMES:
@@ -222,14 +224,14 @@ def gather_report(
 def view_report(
     reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], *, page: str
 ) -> Mapping[str, Any]:
-    """The report of an analysis with its charts drawn for a page; drawn once for the same records."""
-    before: AnalysedSession | None = context.get("before")
+    """Report of an analysis with rendered charts, cached for the same records."""
+    previous: AnalysedSession | None = context.get("before")
     controls: Sequence[ControlVisit] = context["controls"]
     key = (
         page,
         context["patient"],
         _name(this),
-        before and _name(before),
+        previous and _name(previous),
         *((_name(a), kind) for a, kind in context.get("alike", ())),
         *((v.person, v.sex, v.birth_year, v.performed_on, v.found.id, v.edits.key) for v in controls),
     )
@@ -244,9 +246,9 @@ def _draw_report(
     reviewed: ReviewedAnalyses, this: AnalysedSession, context: Mapping[str, Any], page: str
 ) -> dict[str, Any]:
     paper, overview = page == PAPER, page == OVERVIEW
-    patient, session, found = context["patient"], context["session"], this.found
+    patient, session, record = context["patient"], context["session"], this.found
     bundle, model = reports.read(
-        reviewed, found, this.edits, patient, session, context.get("before"), context["controls"]
+        reviewed, record, this.edits, patient, session, context.get("before"), context["controls"]
     )
     used, total = sum(model.used.values()), len(model.strides)
     height = PAPER_BAR_HEIGHT if paper else BAR_HEIGHT
@@ -289,22 +291,22 @@ def _draw_report(
         "identity": _identity(patient, session, model.condition),
         "provenance_line": " · ".join(
             (
-                f"Sagittal {found.code_version}",
+                f"Sagittal {record.code_version}",
                 *(() if model.estimator is None else (model.estimator.name,)),
-                f"settings {found.config_sha256[:8]}",
-                f"input {found.input_sha256[:8]}",
-                day(found.created_at),
+                f"settings {record.config_sha256[:8]}",
+                f"input {record.input_sha256[:8]}",
+                day(record.created_at),
             )
         ),
-        "has_poses": "poses.parquet" in found.files,
+        "has_poses": "poses.parquet" in record.files,
         "trend": _follow(reviewed, model, context),
     }
 
 
 def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str, Any]) -> TrendStrip | None:
-    """Speed and score up to this visit, of those walked alike; None on screen, of few, of poor data.
+    """Gait speed and score up to this visit under the same condition; None on screen or with too few visits.
 
-    The takes of a day are one visit, the last of them; those with poor or damaged data are left out.
+    Trials of one day form one visit, represented by the last; those with poor or damaged data are omitted.
     """
     alike: Sequence[tuple[AnalysedSession, VisitKind]] = context.get("alike", ())
     if model.headline is None or model.quality.kind == "bad" or len(alike) < LEAST_VISITS:
@@ -319,13 +321,13 @@ def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str
 
 
 def _draw_panels(model: ReportModel, heights: Mapping[bool, int]) -> list[dict[str, Any]]:
-    """All cycle charts; those of the last row also say the unit of the x axis."""
+    """All cycle charts; those of the last row include the unit of the x axis."""
     last_row = len(model.panels) - COLUMNS
     return [draw_chart(p, heights[i >= last_row], x_unit=i >= last_row) for i, p in enumerate(model.panels)]
 
 
 def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, Any]:
-    """What the page's clock needs, with some variables' curves only, in whole degrees as it says them."""
+    """Data for the page's clock, with some curves only, rounded to whole degrees."""
     curves: Mapping[str, Any] = model.replay["curves"]  # type: ignore[assignment]
     spans: Sequence[Mapping[str, Any]] = model.replay["strides"]  # type: ignore[assignment]
     strides = [[s["side"], s["start_s"], s["end_s"], int(s["used"])] for s in spans]
@@ -341,7 +343,7 @@ def _list_for_clock(model: ReportModel, variables: Sequence[str]) -> dict[str, A
 
 
 def view_strides(model: ReportModel) -> dict[str, Any]:
-    """What overview and timeline say of the strides: how many, beside which norms, and why there are none."""
+    """Summary of strides for overview and timeline: number used, norms, and reason if there are none."""
     return {
         "used": model.used,
         "norm_source": model.norm_source,
@@ -352,18 +354,18 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
 
 
 def explain_emptiness(model: ReportModel) -> str:
-    """Say why an analysis has no strides, or no squats, to show."""
+    """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
-    what = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
-    read = f"{seconds(model.duration_s)} of data were read, but no complete {what} was seen in them."
-    if what == "squat":
+    cycle = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
+    read = f"{seconds(model.duration_s)} of data were read, but no complete {cycle} was seen in them."
+    if cycle == "squat":
         return model.problem or f"{read} A squat bends the knee by 20° or more, and comes back."
-    asked = "Is a sensor on each foot, and is it the one the mapping says?"
-    return model.problem or " ".join([read, *(causes or [asked])])
+    question = "Is a sensor on each foot, and is it the one the mapping says?"
+    return model.problem or " ".join([read, *(causes or [question])])
 
 
 def _notices(model: ReportModel) -> list[dict[str, Any]]:
-    """Notices by severity; those of one kind share a box, what stopped the analysis has its own place."""
+    """Notices by severity, grouped by kind; errors that stopped the analysis are shown separately."""
     boxes: dict[tuple[str, str], dict[str, Any]] = {}
     for w in sorted(model.warnings, key=lambda w: SEVERITIES.index(w.kind)):
         if w.message == model.problem:
@@ -376,7 +378,7 @@ def _notices(model: ReportModel) -> list[dict[str, Any]]:
 
 
 def _not_compared(session: Session, model: ReportModel) -> str | None:
-    """Why the table has no column of change, None where it has."""
+    """Reason why the table has no column of changes, None if it has."""
     if model.since is not None:
         return None
     if session.feedback:

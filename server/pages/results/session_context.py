@@ -1,4 +1,4 @@
-"""What every page of a session needs: the visit, its patient, the newest job, the live take."""
+"""Common context of all pages of a session: visit, patient, latest job, live trial."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STAGES_OF_DAYS: Final[Mapping[str, str]] = {
 
 
 def read_context(c: Connection, session_id: str) -> dict[str, Any]:
-    """Session, patient, recording and the newest job: what every page of a session needs."""
+    """Session, patient, recording and latest job, required by every page of a session."""
     session = sessions.get(c, session_id)
     patient = patients.get(c, session.patient_id)
     job = find_newest_job(c, session_id)
@@ -61,15 +61,15 @@ def read_context(c: Connection, session_id: str) -> dict[str, Any]:
 
 
 def read_measured_context(c: Connection, session_id: str) -> dict[str, Any]:
-    """The same with the visits of the clinic's controls, for pages that show figures beside theirs."""
+    """Context with the clinic's controls, for pages that compare with them."""
     context = read_context(c, session_id)
     return context | {"controls": controls.list_visits(c, context["patient"], context["session"])}
 
 
 def _may_have_curves(c: Connection, session: Session) -> bool:
-    """Whether pages of curves over the stride and of filters have something to show, now or once analysed.
+    """Whether pages of cycle curves and filters have content, now or after analysis.
 
-    Squats have their own curves, and of a test often only its times are measured.
+    Squats have separate curves, and of a test often only times are measured.
     """
     if session.protocol == "squat":
         return False
@@ -80,7 +80,9 @@ def _may_have_curves(c: Connection, session: Session) -> bool:
 
 
 def lead_to_days(context: Mapping[str, Any]) -> RedirectResponse | None:
-    """Where pages of strides, curves, calibration and filters lead in a visit of daily life: to its days."""
+    """Redirect from pages of strides, curves, calibration and filters to the days of a daily-life
+    recording.
+    """
     session = context["session"]
     if session.protocol != "activity":
         return None

@@ -1,4 +1,4 @@
-"""Which visits go into the tables of a study."""
+"""Selection of visits for the tables of a study."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from sagittal.core.user_text import UserText
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -16,7 +17,6 @@ from sagittal.server.context import Db, StudyVisits
 from sagittal.server.downloads import studies
 from sagittal.server.pages.shell import record_listing, render_page
 from sagittal.server.pages.words import PROTOCOL_NAMES
-from sagittal.web.user_text import UserText
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
@@ -26,27 +26,27 @@ TICKED_AT_MOST: Final = 100
 
 @router.get("/study")
 def show_study(
-    request: Request, db: Db, choice: StudyVisits, who: Annotated[Identity, require(Action.EXPORT_STUDY)]
+    request: Request, db: Db, choice: StudyVisits, user: Annotated[Identity, require(Action.EXPORT_STUDY)]
 ) -> Response:
-    """The visits that fit a choice, and their tables to download."""
+    """Visits that match the selection, and download of their tables."""
     with db.read() as c:
-        found = studies.list_visits(c, who, choice)
-    asked = {
+        matching_visits = studies.list_visits(c, user, choice)
+    selection = {
         "q": UserText(choice.search),
         "protocol": choice.protocol or "",
         "since": choice.since.isoformat() if choice.since else "",
         "until": choice.until.isoformat() if choice.until else "",
     }
-    record_listing(request, who, "patient")
+    record_listing(request, user, "patient")
     return render_page(
-        request, db, who, "study.html", "patients",
-        visits=found[: studies.MOST_VISITS],
-        count=len(found),
-        people=len({s.patient_id for s in found}),
+        request, db, user, "study.html", "patients",
+        visits=matching_visits[: studies.MOST_VISITS],
+        count=len(matching_visits),
+        people=len({s.patient_id for s in matching_visits}),
         most=studies.MOST_VISITS,
-        ticked=len(found) <= TICKED_AT_MOST,
-        asked=asked,
-        all=f"/api/v1/study.zip?{urlencode(asked)}",
+        ticked=len(matching_visits) <= TICKED_AT_MOST,
+        asked=selection,
+        all=f"/api/v1/study.zip?{urlencode(selection)}",
         protocols=[("", "All"), *PROTOCOL_NAMES.items()],
         names=PROTOCOL_NAMES,
     )  # fmt: skip

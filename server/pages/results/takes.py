@@ -1,4 +1,4 @@
-"""The takes of one visit beside each other, as the overview of each of them shows them."""
+"""Side-by-side trials of one visit, for the overview of each."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def view_takes(
     session_id: str,
     first: Sequence[ParameterRow],
 ) -> dict[str, Any] | None:
-    """The first values of every take of this visit and their mean; None where it has only this one."""
+    """First values of every trial of this visit and their mean; None with a single trial."""
     visit = visits.find_visit_of(done, session_id)
     if visit is None or len(visit.takes) < 2:
         return None
@@ -32,8 +32,8 @@ def view_takes(
     for row in first:
         name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
         for side in (None, *SIDES):
-            found = measured.get((name, side))
-            if found is None or found.mean.mean is None:
+            figure = measured.get((name, side))
+            if figure is None or figure.mean.mean is None:
                 continue
             digits = find_term(name).digits
             rows.append(
@@ -41,8 +41,8 @@ def view_takes(
                     "title": find_term(name).label,
                     "unit": find_term(name).unit,
                     "side": side,
-                    "cells": [_print_take(found.by_take.get(sid), digits) for sid in ids],
-                    "mean": format_number(found.mean.mean, digits),
+                    "cells": [_print_take(figure.by_take.get(sid), digits) for sid in ids],
+                    "mean": format_number(figure.mean.mean, digits),
                 }
             )
     columns = [

@@ -1,4 +1,4 @@
-"""Strides, events and signals over time, to look at and to correct."""
+"""Strides, events and signals over time, for review and correction."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def show_timeline(
     db: Db,
     reviewed: Reviewed,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """Strides, events and signals over time, to look at and to correct."""
+    """Strides, events and signals over time, for review and correction."""
     with db.read() as c:
         context = read_measured_context(c, sid)
         if elsewhere := lead_to_days(context):
@@ -47,9 +47,9 @@ def show_timeline(
         context["replay"] = {**model.replay, "curves": {}}
         context["lanes"] = [vars(lane) for lane in signals.list_lanes(reviewed, latest)]
         context["fixed_because"] = reviewed.open(latest).fixed_because
-        context["editable"] = context["fixed_because"] is None and who.may(Action.REVIEW)
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "timeline.html", "patients", **context)
+        context["editable"] = context["fixed_because"] is None and user.may(Action.REVIEW)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "timeline.html", "patients", **context)
 
 
 @router.get("/sessions/{sid}/timeline/numbers")
@@ -59,33 +59,33 @@ def show_numbers(
     reviewed: Reviewed,
     trail: OpenTrail,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
 ) -> Response:
-    """The part of the timeline page that follows an edit; asked for in another way, the page itself."""
+    """Part of the timeline page updated after an edit; redirects to the page if requested directly."""
     if FRAGMENT not in request.headers:
         return RedirectResponse(f"/sessions/{sid}/timeline#numbers", status_code=303)
     with db.read() as c:
         context = read_measured_context(c, sid)
         latest = analyses.get_shown(c, sid)
         edits = edit_log.edits_of(c, latest.id)
-    trail.record_watched(who, "numbers.opened", "session", sid)
+    trail.record_watched(user, "numbers.opened", "session", sid)
     numbers = view_numbers(read_model(reviewed, latest, edits, context))
     return render(request, "_numbers.html", {"numbers": numbers})
 
 
 def read_model(
     reviewed: ReviewedAnalyses,
-    found: analyses.AnalysisRecord,
+    record: analyses.AnalysisRecord,
     edits: edit_log.EditHistory,
     context: Mapping[str, Any],
 ) -> ReportModel:
-    """The report of an analysis, compared with no visit."""
+    """Report of an analysis without comparison to other visits."""
     patient, session = context["patient"], context["session"]
-    return reports.read(reviewed, found, edits, patient, session, None, context["controls"])[1]
+    return reports.read(reviewed, record, edits, patient, session, None, context["controls"])[1]
 
 
 def view_numbers(model: ReportModel) -> dict[str, Any]:
-    """What of the report stands beside the timeline and changes with every edit."""
+    """Part of the report shown with the timeline, which changes with every edit."""
     return {
         **view_strides(model),
         "first": select_first(model),

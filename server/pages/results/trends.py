@@ -1,4 +1,4 @@
-"""Figures over the visits of a patient."""
+"""Parameters over the visits of a patient."""
 
 from __future__ import annotations
 
@@ -66,29 +66,29 @@ def show_trends(
     db: Db,
     reviewed: Reviewed,
     pid: Id,
-    who: Annotated[Identity, require(Action.READ_RESULT)],
+    user: Annotated[Identity, require(Action.READ_RESULT)],
     show: Shown,
     protocol: Protocol | None = None,
     like: Annotated[str | None, Query(pattern=HEX_ID)] = None,
 ) -> Response:
-    """Figures over the visits of a patient."""
+    """Parameters over the visits of a patient."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)
     history = histories.read_history(reviewed, patient, done, plans, protocol, like)
-    record_opening(request, who, "patient", pid)
+    record_opening(request, user, "patient", pid)
     view = view_trends(history, show)
     performance = histories.read_performance(reviewed, done)
     if performance:
         walks = [a for a in done if a.session.protocol != "activity"]
         walked = histories.read_history(reviewed, patient, walks, plans) if walks else None
-        shown = history if history.condition and history.condition.protocol != "activity" else walked
-        view["daily"] = view_daily_trend(shown, performance)
-    return render_page(request, db, who, "trends.html", "patients", patient=patient, trends=view)
+        displayed = history if history.condition and history.condition.protocol != "activity" else walked
+        view["daily"] = view_daily_trend(displayed, performance)
+    return render_page(request, db, user, "trends.html", "patients", patient=patient, trends=view)
 
 
 def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
-    """Assessments of the newest programme that are still to come."""
+    """Upcoming assessments of the latest programme."""
     plans = history.programmes[:1]
     return [
         PlannedAssessment(v.label, v.planned_on)
@@ -99,11 +99,11 @@ def list_ahead(history: PatientHistory) -> list[PlannedAssessment]:
 
 
 def view_daily_trend(walked: PatientHistory | None, performance: Sequence[PerformanceDay]) -> dict[str, Any]:
-    """Capacity beside performance: charts over one time axis, and every value in a table.
+    """Capacity and performance on a common time axis, and a table of all values.
 
     Parameters
     ----------
-    walked : visits in the clinic that were walked alike, None where there is none.
+    walked : clinic visits under the same condition, None if there are none.
     """
     capacity = [] if walked is None else histories.read_capacity(walked)
     rows = [
@@ -139,40 +139,40 @@ def view_daily_trend(walked: PatientHistory | None, performance: Sequence[Perfor
 
 
 def draw_figures(history: PatientHistory, trained: str | None) -> dict[str, Any] | None:
-    """Five figures over the visits of one condition, each of one side; None without a visit.
+    """Five parameters over the visits of one condition, one side each; None without a visit.
 
     Parameters
     ----------
     trained : parameter of the prescription in force, None = none.
     """
-    there = set(names_in(history.visits))
-    names = [n for n in dict.fromkeys((trained, *FIGURES)) if n in there][:FIGURES_SHOWN]
+    available = set(names_in(history.visits))
+    names = [n for n in dict.fromkeys((trained, *FIGURES)) if n in available][:FIGURES_SHOWN]
     affected = history.patient.affected_side
-    found = follow_figures(history.visits, names, history.norms, history.usual, affected)
-    if not found:
+    trends = follow_figures(history.visits, names, history.norms, history.usual, affected)
+    if not trends:
         return None
     coming = list_ahead(history)
     figures = []
-    for t in found:
+    for t in trends:
         line = _pick_side(t, affected)
         last = line.points[-1 if line.latest is None else line.latest]
         drawn = _figure(t, line, history.visits, coming, FIGURE_HEIGHT, small=True)
         figures.append({**drawn, "value": format_number(last.value, t.term.digits)})
-    kept = [(t, line) for t in found for line in (_pick_side(t, affected),)]
+    selected = [(t, line) for t in trends for line in (_pick_side(t, affected),)]
     return {
         "figures": figures,
         "condition": None if history.condition is None else history.condition.words,
         "others": len(history.others),
-        "has_mdc": any(line.mdc is not None for _, line in kept),
+        "has_mdc": any(line.mdc is not None for _, line in selected),
         "has_mcid": False,
-        "has_estimated": any(p.estimated for _, line in kept for p in line.points),
+        "has_estimated": any(p.estimated for _, line in selected for p in line.points),
         "has_training": any(v.kind == "training" for v in history.visits),
-        "norms": any(t.norm is not None for t in found),
+        "norms": any(t.norm is not None for t in trends),
     }
 
 
 def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
-    """The line that stands for a figure: of the affected side, else of the side further from the norm."""
+    """The side shown for a parameter: the affected side, otherwise the one further from the norm."""
     mine = next((line for line in trend.lines if line.side == affected), None)
     if mine is not None or trend.norm is None:
         return mine or trend.lines[0]
@@ -181,44 +181,46 @@ def _pick_side(trend: Trend, affected: Side | None) -> TrendSeries:
 
 
 def view_trends(history: PatientHistory, chosen: Sequence[str], height: int = 196) -> dict[str, Any]:
-    """The trends page: charts of the chosen figures, the choice, limits with sources, and the table.
+    """Template context: charts of the selected parameters, selection, limits with sources, and table.
 
     Parameters
     ----------
     height : of a chart in px.
     """
-    there = names_in(history.visits)
-    names = [n for n in there if n in chosen] or [n for n in PRIMARY if n in there]
-    names = names or list(there[: len(PRIMARY)])
-    found = follow_figures(history.visits, names, history.norms, history.usual, history.patient.affected_side)
+    available = names_in(history.visits)
+    names = [n for n in available if n in chosen] or [n for n in PRIMARY if n in available]
+    names = names or list(available[: len(PRIMARY)])
+    trends = follow_figures(
+        history.visits, names, history.norms, history.usual, history.patient.affected_side
+    )
     groups: dict[str, list[dict[str, Any]]] = {}
-    for name in there:
+    for name in available:
         term = find_term(name)
         groups.setdefault(term.group, []).append(
             {"name": name, "title": term.label, "unit": term.unit, "on": name in names}
         )
     return {
-        **_shown(history, found, height),
+        **_shown(history, trends, height),
         "groups": list(groups.items()),
         "query": "&".join(f"show={name}" for name in names),
         "condition": None if history.condition is None else history.condition.words,
         "like": history.visits[-1].session_id if history.visits else None,
         "others": [(o.session_id, o.condition.words, o.count) for o in history.others],
         "visits": [_column(v) for v in history.visits],
-        "rows": [row for trend in found for row in _rows(trend, history.visits)],
+        "rows": [row for trend in trends for row in _rows(trend, history.visits)],
     }
 
 
-def _shown(history: PatientHistory, found: Sequence[Trend], height: int) -> dict[str, Any]:
+def _shown(history: PatientHistory, trends: Sequence[Trend], height: int) -> dict[str, Any]:
     coming = list_ahead(history)
-    lines = [(t, line) for t in found for line in t.lines]
+    lines = [(t, line) for t in trends for line in t.lines]
     sources: dict[str, list[str]] = {}
     for t, line in lines:
         change = line.change
         for sentence in () if change is None else change_words(change).limits:
             sources.setdefault(sentence, []).append(t.term.label)
     norms: dict[str, list[str]] = {}
-    for t in found:
+    for t in trends:
         if t.norm is not None:
             norms.setdefault(f"{GROUPS.get(t.norm.group, t.norm.group)} ({t.norm.source})", []).append(
                 t.term.label
@@ -257,7 +259,7 @@ def _figure(
 
 
 def _waiting(line: TrendSeries) -> str:
-    """What is said as long as there are not two assessments."""
+    """Text shown until there are two assessments."""
     if line.base is None:
         return "no assessment yet"
     if line.points[line.base].estimated:
@@ -276,7 +278,7 @@ def _column(v: AnalysedVisit) -> dict[str, Any]:
 
 
 def _rows(trend: Trend, visits: Sequence[AnalysedVisit]) -> list[dict[str, Any]]:
-    """A row per side: the value of every visit, then the verdict."""
+    """One row per side: values of all visits, then the assessment of the change."""
     rows = []
     for line in trend.lines:
         by_visit = {p.visit: p for p in line.points}

@@ -1,1 +1,1 @@
-"""Pages of signed reports and who may read them."""
+"""Pages of signed reports and access to them."""

@@ -1,4 +1,4 @@
-"""What is handed out beside the report: the patient's leaflet, and the report over all visits."""
+"""Handouts in addition to the report: the patient's leaflet, and the report over all visits."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ CHART_HEIGHT: Final = 108
 
 @router.get("/sessions/{sid}/leaflet")
 def show_leaflet(
-    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, sid: Id, who: Reader
+    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, sid: Id, user: Reader
 ) -> Response:
-    """The leaflet for the patient: plain words, large print."""
+    """Leaflet for the patient in plain language and large print."""
     context = gather_leaflet(db, reviewed, sid)
-    trail.record_opened(who, "leaflet.opened", "session", sid)
-    return render_sheets(request, who, LEAFLET, **context)
+    trail.record_opened(user, "leaflet.opened", "session", sid)
+    return render_sheets(request, user, LEAFLET, **context)
 
 
 @router.get("/sessions/{sid}/leaflet.pdf")
@@ -56,22 +56,22 @@ def make_leaflet(
     trail: OpenTrail,
     settings: Config,
     sid: Id,
-    who: Reader,
+    user: Reader,
 ) -> Response:
-    """The same as PDF."""
+    """The leaflet as PDF."""
     context = gather_leaflet(db, reviewed, sid)
-    trail.record_opened(who, "leaflet.opened", "session", sid)
+    trail.record_opened(user, "leaflet.opened", "session", sid)
     return print_pdf(request, settings, LEAFLET, context, f"leaflet-{sid[:8]}.pdf")
 
 
 @router.get("/patients/{pid}/course")
 def show_course(
-    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, pid: Id, who: Reader
+    request: Request, db: Db, reviewed: Reviewed, trail: OpenTrail, pid: Id, user: Reader
 ) -> Response:
-    """The report over all visits: the main figures with the measurement error, conditions, dates."""
+    """Report over all visits: main parameters with measurement errors, conditions, dates."""
     context = gather_course(db, reviewed, pid)
-    trail.record_opened(who, "course.opened", "patient", pid)
-    return render_sheets(request, who, COURSE, **context)
+    trail.record_opened(user, "course.opened", "patient", pid)
+    return render_sheets(request, user, COURSE, **context)
 
 
 @router.get("/patients/{pid}/course.pdf")
@@ -82,32 +82,32 @@ def make_course(
     trail: OpenTrail,
     settings: Config,
     pid: Id,
-    who: Reader,
+    user: Reader,
 ) -> Response:
-    """The same as PDF."""
+    """The report over all visits as PDF."""
     context = gather_course(db, reviewed, pid)
-    trail.record_opened(who, "course.opened", "patient", pid)
+    trail.record_opened(user, "course.opened", "patient", pid)
     return print_pdf(request, settings, COURSE, context, f"course-{pid[:8]}.pdf")
 
 
 def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[str, Any]:
-    """What the leaflet of a walk shows; raises Conflict where there is no analysed walk."""
+    """Template context of the leaflet of a walk; raises Conflict if no walk is analysed."""
     with db.read() as c:
         patient = patients.get(c, sessions.get(c, sid).patient_id)
         done = histories.list_analysed(c, patient.id)
         this = next((a for a in done if a.session.id == sid), None)
         if this is None or this.session.protocol not in sessions.WALKS:
             raise Conflict("no_walk", "This session has no analysed walk, so there is no leaflet of it.")
-        before = comparisons.find_previous(c, this.session, done)
+        previous = comparisons.find_previous(c, this.session, done)
         written = prescriptions.of_patient(c, patient.id)
     new = reviewed.read_numbers(this.found, this.edits)
-    old = None if before is None else reviewed.read_numbers(before.found, before.edits)
+    old = None if previous is None else reviewed.read_numbers(previous.found, previous.edits)
     if old is not None and not _is_usable(old):
-        old = before = None
-    if before is None or old is None:
+        old = previous = None
+    if previous is None or old is None:
         changes: tuple[Change, ...] = ()
     else:
-        norms = comparisons.pair_norms(patient, (before.session, old), (this.session, new))
+        norms = comparisons.pair_norms(patient, (previous.session, old), (this.session, new))
         changes = compare_figures(old, new, norms, patient.affected_side)
     trained = next((w.content for w in written if w.ended_at is None), None)
     return {
@@ -116,7 +116,7 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         "back": f"/sessions/{sid}/report",
         "pdf": f"/sessions/{sid}/leaflet.pdf",
         "figures": list_figures(new.parameters, changes, patient.affected_side) if _is_usable(new) else (),
-        "before": None if before is None else before.session.performed_on,
+        "before": None if previous is None else previous.session.performed_on,
         "practise": None if trained is None else CATALOGUE[trained.parameter].everyday,
         "practise_side": None if trained is None else side_words(trained.side),
         "made_by": f"Sagittal {this.found.code_version} · {day(this.found.created_at)}",
@@ -124,12 +124,12 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
 
 
 def _is_usable(numbers: Numbers) -> bool:
-    """Whether a number may be told, or be compared with: not of poor data."""
+    """Whether values may be reported and compared: not with poor data quality."""
     return numbers.verdict[0] != "bad"
 
 
 def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[str, Any]:
-    """What the report over the visits shows; raises Conflict where nothing is analysed."""
+    """Template context of the report over the visits; raises Conflict if nothing is analysed."""
     with db.read() as c:
         patient = patients.get(c, pid)
         done, plans = histories.read(c, patient)

@@ -1,4 +1,4 @@
-"""Documents that stand alone: the sheets of a page with their styles in them, without scripts."""
+"""Self-contained documents: printed pages with inline styles, without scripts."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from markupsafe import Markup
 from starlette.requests import Request
 from starlette.responses import Response
 
+from sagittal.core.user_text import UserText
 from sagittal.server.http.headers import allow_camera, lock_document
 from sagittal.server.http.templates import TEMPLATES, language_of
 from sagittal.server.pages.assets import STATIC
 from sagittal.server.pages.words import PROTOCOL_NAMES
 from sagittal.server.settings import Settings
 from sagittal.server.sharing import pdfs
-from sagittal.web.user_text import UserText
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
 """Style sheets of paper, in their order."""
@@ -30,18 +30,18 @@ _STYLE: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 
 @functools.cache
 def read_styles() -> str:
-    """The style sheets of paper in one."""
+    """Combined style sheets for print."""
     return "\n".join((STATIC / "css" / f"{name}.css").read_text("utf-8") for name in SHEETS)
 
 
 def write_document(language: str, template: str, context: Mapping[str, Any]) -> bytes:
-    """Write a document that stands alone: a signed report, or what a PDF is made of."""
+    """Write a self-contained document: a signed report, or the source of a PDF."""
     page = TEMPLATES[language].get_template(template)
     return page.render({**context, "styles": Markup(read_styles())}).encode()  # noqa: S704 - ours
 
 
 def hide_person(context: Mapping[str, Any], number: str) -> dict[str, Any]:
-    """What a report shows without what leads to the person: a number stands for the patient's code."""
+    """Context of a report without identifying data: a number replaces the patient's code."""
     patient, session, report = context["patient"], context["session"], context["report"]
     number = UserText(number)
     title = PROTOCOL_NAMES.get(session.protocol, session.protocol)
@@ -55,14 +55,14 @@ def hide_person(context: Mapping[str, Any], number: str) -> dict[str, Any]:
 
 
 def show_document(content: bytes, *, is_shared: bool = False) -> Response:
-    """Answer with a document that stands alone: nothing is loaded, no script runs.
+    """Response with a self-contained document that loads nothing and runs no scripts.
 
     Parameters
     ----------
-    is_shared : it is for somebody without an account; no page learns from where it was opened.
+    is_shared : for a reader without an account; sends no referrer to linked pages.
     """
-    found = _STYLE.search(content.decode())
-    digest = hashlib.sha256((found[1] if found else "").encode()).digest()
+    match = _STYLE.search(content.decode())
+    digest = hashlib.sha256((match[1] if match else "").encode()).digest()
     headers = {
         "Content-Security-Policy": lock_document(base64.b64encode(digest).decode()),
         "Permissions-Policy": allow_camera("()"),
@@ -76,12 +76,12 @@ def show_document(content: bytes, *, is_shared: bool = False) -> Response:
 def print_pdf(
     request: Request, settings: Settings, template: str, context: Mapping[str, Any], name: str
 ) -> Response:
-    """Answer with the PDF of a template's document, in the reader's language; raises as `pdfs.make_pdf`."""
+    """Response with a template's document as PDF, in the user's language; raises like `pdfs.make_pdf`."""
     document = write_document(language_of(request), template, context)
     return show_pdf(pdfs.make_pdf(settings, document), name)
 
 
 def show_pdf(content: bytes, name: str) -> Response:
-    """Answer with a PDF that the browser shows."""
+    """Response with a PDF displayed in the browser."""
     headers = {"Content-Disposition": f'inline; filename="{name}"'}
     return Response(content, media_type="application/pdf", headers=headers)

@@ -1,4 +1,4 @@
-"""A session's report as a document: its PDF, signing, its versions, and who may read it by a link."""
+"""A session's report as a document: PDF, signing, versions, and links."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
 
 @router.get("/sessions/{sid}/report")
-def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
-    """The therapist's text, signing, the versions that were signed, the links to them."""
+def show_desk(request: Request, db: Db, sid: Id, user: Reader) -> Response:
+    """Assessment text, signing, signed versions and their links."""
     with db.read() as c:
         context = read_context(c, sid)
         if analyses.latest(c, sid) is None:
@@ -54,15 +54,15 @@ def show_desk(request: Request, db: Db, sid: Id, who: Reader) -> Response:
         context["versions"] = signed_reports.of_session(c, sid)
         context["in_force"] = next((r for r in context["versions"] if r.in_force), None)
         context["links"] = report_links.of_session(c, sid)
-        context["emergency"] = find_emergency(c, who, context["patient"].id)
+        context["emergency"] = find_emergency(c, user, context["patient"].id)
     context["numbers"] = {r.id: r.number for r in context["versions"]}
     context |= {
         "usual_days": report_links.USUAL_DAYS,
         "most_days": report_links.MOST_DAYS,
         "most_characters": signed_reports.ASSESSMENT_CHARACTERS,
     }
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "report.html", "patients", **context)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "report.html", "patients", **context)
 
 
 @router.get("/sessions/{sid}/report.pdf")
@@ -73,13 +73,13 @@ def make_draft(
     trail: OpenTrail,
     settings: Config,
     sid: Id,
-    who: Reader,
+    user: Reader,
     named: bool = False,
 ) -> Response:
-    """The report as it stands now, as PDF; it says that it is not signed, and whose it is if asked for."""
-    context = _gather(db, reviewed, sid, who)
-    trail.record_opened(who, "report.opened", "session", sid)
-    context |= name_on_paper(request, db, settings, who, context["patient"].id, named=named)
+    """Current report as PDF, marked as unsigned, with the patient's name if requested."""
+    context = _gather(db, reviewed, sid, user)
+    trail.record_opened(user, "report.opened", "session", sid)
+    context |= name_on_paper(request, db, settings, user, context["patient"].id, named=named)
     return print_pdf(request, settings, choose_template(PAPER, context), context, f"report-{sid[:8]}.pdf")
 
 
@@ -90,53 +90,53 @@ def sign(
     reviewed: Reviewed,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.SIGN_REPORT)],
+    user: Annotated[Identity, require(Action.SIGN_REPORT)],
 ) -> dict[str, str]:
-    """Sign the report as it stands now: its document is made once, kept, and locked."""
+    """Sign the current report: its document is created once, stored and locked."""
     report_id, language = new_id(), language_of(request)
     with db.read() as c:
-        signature = signed_reports.prepare_signature(c, sid, report_id, who.display_name)
-    context = _gather(db, reviewed, sid, who) | {"signature": signature}
-    shown = {DOCUMENT: context, PSEUDONYMISED: hide_person(context, f"R-{report_id[:8]}")}
+        signature = signed_reports.prepare_signature(c, sid, report_id, user.display_name)
+    context = _gather(db, reviewed, sid, user) | {"signature": signature}
+    contexts = {DOCUMENT: context, PSEUDONYMISED: hide_person(context, f"R-{report_id[:8]}")}
     template = choose_template(PAPER, context)
-    written = {name: write_document(language, template, each) for name, each in shown.items()}
+    written = {name: write_document(language, template, each) for name, each in contexts.items()}
     space = context["session"].patient_id
     stored = {name: blobs.put(space, content) for name, content in written.items()}
     with db.write() as c:
         for blob in stored.values():
             blobs.require(space, blob.sha256)
         analysis_id = context["analysis"].id
-        found = signed_reports.keep_signed(c, who, signature, sid, analysis_id, language, stored)
-    return {"id": found.id, "sha256": found.sha256}
+        report = signed_reports.keep_signed(c, user, signature, sid, analysis_id, language, stored)
+    return {"id": report.id, "sha256": report.sha256}
 
 
 @router.get("/signed-reports/{report_id}")
-def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, who: Reader) -> Response:
-    """A signed report, byte by byte as it was signed."""
+def show_signed(db: Db, blobs: Blobs, trail: OpenTrail, report_id: Id, user: Reader) -> Response:
+    """A signed report, exactly as signed."""
     with db.read() as c:
         session_id = signed_reports.get(c, report_id).session_id
         content = signed_reports.read_document(c, blobs, report_id)
-    trail.record_opened(who, "signed_report.opened", "session", session_id, {"report_id": report_id})
+    trail.record_opened(user, "signed_report.opened", "session", session_id, {"report_id": report_id})
     return show_document(content)
 
 
 @router.get("/signed-reports/{report_id}/report.pdf")
 def show_signed_pdf(
-    db: Db, blobs: Blobs, trail: OpenTrail, settings: Config, report_id: Id, who: Reader
+    db: Db, blobs: Blobs, trail: OpenTrail, settings: Config, report_id: Id, user: Reader
 ) -> Response:
-    """The same as PDF."""
+    """The signed report as PDF."""
     with db.read() as c:
-        found = signed_reports.get(c, report_id)
-    trail.record_opened(who, "signed_report.opened", "session", found.session_id, {"report_id": report_id})
+        report = signed_reports.get(c, report_id)
+    trail.record_opened(user, "signed_report.opened", "session", report.session_id, {"report_id": report_id})
     content = pdfs.read_signed_pdf(db, blobs, settings, report_id)
-    return show_pdf(content, f"report-{found.session_id[:8]}-version-{found.number}.pdf")
+    return show_pdf(content, f"report-{report.session_id[:8]}-version-{report.number}.pdf")
 
 
 @router.get("/r/{token}", dependencies=[require(Action.READ_SHARED)])
 def show_shared(
     request: Request, db: Db, blobs: Blobs, trail: OpenTrail, throttle: Failures, token: str
 ) -> Response:
-    """The report that a link leads to, for who has its address; without the patient's code."""
+    """The report of a link, without the patient's code."""
     address = address_of(request)
     guessed = f"{SHARED} {address}"  # who guesses elsewhere stops nobody here
     try:
@@ -153,8 +153,8 @@ def show_shared(
     return show_document(content, is_shared=True)
 
 
-def _gather(db: Database, reviewed: ReviewedAnalyses, sid: str, who: Identity) -> dict[str, Any]:
-    context = gather_report(db, reviewed, sid, who, PAPER)
+def _gather(db: Database, reviewed: ReviewedAnalyses, sid: str, user: Identity) -> dict[str, Any]:
+    context = gather_report(db, reviewed, sid, user, PAPER)
     if context["report"] is None:
         raise NotFound("analysis of session", sid)
     return context

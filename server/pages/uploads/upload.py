@@ -1,4 +1,4 @@
-"""The upload page: the files, what was found in them, which sensor is probably where."""
+"""Upload page: files, inspection results, and sensor placement."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.frames import SEGMENTS
+from sagittal.core.message import read_message
 from sagittal.core.plurals import plural
 from sagittal.core.subject.anthropometry import LIMITS
+from sagittal.core.user_text import UserText
+from sagittal.core.user_text import quote as quote_text
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action
@@ -29,8 +32,6 @@ from sagittal.server.report.files.bundle import ABOUT_FILES
 from sagittal.server.results import histories
 from sagittal.server.uploads import recordings, uploads
 from sagittal.server.uploads.recordings import StoredRecording
-from sagittal.web.user_text import UserText
-from sagittal.web.user_text import quote as quote_text
 from sagittal.web.words import number, seconds
 
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
@@ -88,10 +89,10 @@ def show_upload(
     db: Db,
     blobs: Blobs,
     sid: Id,
-    who: Annotated[Identity, require(Action.READ_SESSION)],
+    user: Annotated[Identity, require(Action.READ_SESSION)],
     lengths: Annotated[bool, Query(description="show the lengths of the body at once")] = False,
 ) -> Response:
-    """Upload files, see what was found in them, say which sensor is where."""
+    """Upload files, view inspection results, and assign sensors to segments."""
     with db.read() as c:
         session = sessions.get(c, sid)
         patient = patients.get(c, session.patient_id)
@@ -102,18 +103,18 @@ def show_upload(
         for f in coming
     ]
     view["lengths_open"] = lengths or view["lengths_said"]
-    record_opening(request, who, "session", sid)
-    return render_page(request, db, who, "upload.html", "patients", session=session, patient=patient, **view)
+    record_opening(request, user, "session", sid)
+    return render_page(request, db, user, "upload.html", "patients", session=session, patient=patient, **view)
 
 
 def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Patient) -> dict[str, Any]:
-    """Files of the session, the waiting inspection, what was found."""
+    """Template context: files of the session, running inspection, results."""
     files = [
         {"name": f.name, "size": f.size, "href": f"/api/v1/sessions/{s.id}/files/{quote(f.name)}"}
         for f in (this.files if this else ())
     ]
     manifest = (this.manifest if this else None) or {}
-    found = (this.inspection if this else None) or {}
+    results = (this.inspection if this else None) or {}
     measured = {"height_m": s.height_m or p.height_m, **(manifest.get("subject") or {})}
     look = this.job if this else None
     waiting = look is not None and not look.finished
@@ -124,12 +125,12 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
         "files": files,
         "inspect_job": view_job(look) if look is not None and waiting else None,
         "problem": problem,
-        "ask_columns": bool(files) and not waiting and _asks_columns(manifest, found),
+        "ask_columns": bool(files) and not waiting and _asks_columns(manifest, results),
         "found": None
         if this is None or this.inspection is None or waiting
         else view_inspection(this, find_remembered(c, s), _recall(c, this, s)),
         "segments": SEGMENT_CHOICES,
-        "said": _said({"subject": found.get("subject") or {}}) | _said({**manifest, "subject": measured}),
+        "said": _said({"subject": results.get("subject") or {}}) | _said({**manifest, "subject": measured}),
         "goniometer": GONIOMETER,
         "lengths": LENGTHS,
         "lengths_said": bool((manifest.get("subject") or {}).get("measures")),
@@ -137,56 +138,56 @@ def view_upload(c: Connection, this: StoredRecording | None, s: Session, p: Pati
     }
 
 
-def _asks_columns(manifest: Mapping[str, Any], found: Mapping[str, Any]) -> bool:
-    """Whether a table may want to be described, or was: then its columns are shown."""
-    left = any(n["code"] == "file_not_read" for n in found.get("notices", ()))
-    return not found or left or any(s.get("columns") for s in manifest.get("sources") or ())
+def _asks_columns(manifest: Mapping[str, Any], table: Mapping[str, Any]) -> bool:
+    """Whether a table needs or has a mapping, so that its columns are shown."""
+    left = any(n["code"] == "file_not_read" for n in table.get("notices", ()))
+    return not table or left or any(s.get("columns") for s in manifest.get("sources") or ())
 
 
 def _said(tree: Mapping[str, Any]) -> dict[str, object]:
-    """Values by their path, without those nobody gave."""
+    """Values by path, omitting missing ones."""
     return {path: value for path, value in _paths(tree) if value is not None}
 
 
-def _paths(tree: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, object]]:
+def _paths(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, object]]:
     """Values of nested mappings by their path, "subject.shoe.back_m"."""
     for key, value in tree.items():
         if isinstance(value, Mapping):
-            yield from _paths(value, f"{before}{key}.")
+            yield from _paths(value, f"{prefix}{key}.")
         else:
-            yield f"{before}{key}", value
+            yield f"{prefix}{key}", value
 
 
 def find_remembered(c: Connection, s: Session) -> Mapping[str, str | None]:
-    """Which sensor sat where at this patient's other visits, the newest analysed one that says so."""
-    for other in reversed(histories.list_analysed(c, s.patient_id)):
-        if other.session.id == s.id:
+    """Sensor placement at this patient's latest other analysed visit that has one."""
+    for visit in reversed(histories.list_analysed(c, s.patient_id)):
+        if visit.session.id == s.id:
             continue
-        sensors: Mapping[str, str | None] = (other.found.manifest or {}).get("sensors") or {}
+        sensors: Mapping[str, str | None] = (visit.found.manifest or {}).get("sensors") or {}
         if any(sensors.values()):
             return sensors
     return {}
 
 
 def _recall(c: Connection, this: StoredRecording, s: Session) -> LastPlaces:
-    """Where the sensors of this upload were in the clinic's last takes, those of other patients too."""
+    """Placement of this upload's sensors in the clinic's latest trials, including other patients'."""
     own = [d["device_id"] for d in (this.inspection or {})["devices"]]
     return recall_places(c, own, but=s.id)
 
 
 def fits_names(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
-    """Whether no file and no sensor's name says another place, or such a place of another sensor."""
+    """Whether the placement is consistent with segments named by files or sensor labels."""
     by_name = [d for d in devices if d["basis"] in {"declared", "label"} and d["suggested"]]
     named = {d["device_id"]: d["suggested"] for d in by_name}
-    taken = {segment: device for device, segment in named.items()}
-    return all(named.get(d, s) == s and taken.get(s, d) == d for d, s in sensors.items() if s)
+    segments_taken = {segment: device for device, segment in named.items()}
+    return all(named.get(d, s) == s and segments_taken.get(s, d) == d for d, s in sensors.items() if s)
 
 
 def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, str | None]) -> bool:
-    """Whether a remembered mapping covers these sensors and does not contradict how they move now."""
+    """Whether a remembered mapping covers these sensors and is consistent with their movement."""
     own = {d["device_id"] for d in devices}
-    worn = {device for device, segment in sensors.items() if segment}
-    if not worn or not worn <= own:
+    instrumented = {device for device, segment in sensors.items() if segment}
+    if not instrumented or not instrumented <= own:
         return False
     sides: dict[int, set[str]] = {1: set(), 2: set()}
     for d in devices:
@@ -198,42 +199,43 @@ def fits_movement(devices: Sequence[Mapping[str, Any]], sensors: Mapping[str, st
             return False
         if d["suggested_leg"]:
             sides[d["suggested_leg"]].add(side)
-    return all(len(found) <= 1 for found in sides.values()) and not sides[1] & sides[2]
+    return all(len(segments) <= 1 for segments in sides.values()) and not sides[1] & sides[2]
 
 
 def view_inspection(
     this: StoredRecording, earlier: Mapping[str, str | None], last: LastPlaces = NO_PLACES
 ) -> dict[str, Any]:
-    """What the inspection found: facts, sensors with their most likely segment, notices.
+    """Template context of an inspection: facts, sensors with their most likely segment, notices.
 
-    A sensor's place is, in this order: what a person set, what the files declare, that of this patient's last
-    visit with these sensors, what a name says, that of the clinic's last take with it, what movement
-    suggests. Earlier takes count as a whole or not at all: names or movement may contradict them.
+    The segment of a sensor is, in order of priority: set by the user, declared by the files, from this
+    patient's last visit with these sensors, from a name, from the clinic's last trial with it, suggested by
+    movement. Earlier placements are used as a whole or not at all, if inconsistent with names or movement.
 
     Parameters
     ----------
-    earlier : mapping of an earlier visit; used when it covers these sensors and fits how they move.
-    last : of the clinic's last takes; used where nothing else is known and it fits names and movement.
+    earlier : mapping of an earlier visit, used if it covers these sensors and fits their movement.
+    last : placement in the clinic's latest trials, used if nothing else is known and it fits names and
+        movement.
     """
-    found: Mapping[str, Any] = this.inspection or {}
-    devices: Sequence[Mapping[str, Any]] = found["devices"]
-    said: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
-    past = earlier if not said and fits_movement(devices, earlier) else {}
-    usual: Mapping[str, str | None] = {} if said or past else last.segments
+    results: Mapping[str, Any] = this.inspection or {}
+    devices: Sequence[Mapping[str, Any]] = results["devices"]
+    manual: Mapping[str, str | None] = (this.manifest or {}).get("sensors") or {}
+    past = earlier if not manual and fits_movement(devices, earlier) else {}
+    usual: Mapping[str, str | None] = {} if manual or past else last.segments
     if not (fits_names(devices, usual) and fits_movement(devices, usual)):
         usual = {}
-    chosen = {d["device_id"]: _segment(d, said, past, usual) for d in devices}
+    chosen = {d["device_id"]: _segment(d, manual, past, usual) for d in devices}
     guessed = any(basis == "movement" for _, basis in chosen.values())
-    known = {basis for segment, basis in chosen.values() if segment and basis}
+    bases = {basis for segment, basis in chosen.values() if segment and basis}
     hint = next(
-        (text for basis, text in BASIS_WORDS.items() if basis in known), "Say where each sensor sits."
+        (text for basis, text in BASIS_WORDS.items() if basis in bases), "Say where each sensor sits."
     )
-    left_out = [n["message"] for n in found["notices"] if n["code"] in ABOUT_FILES]
+    left_out = [read_message(n) for n in results["notices"] if n["code"] in ABOUT_FILES]
     return {
-        "facts": _facts(found, devices),
+        "facts": _facts(results, devices),
         "unused": left_out,
         "sensors": [_sensor(d, chosen[d["device_id"]][0]) for d in devices],
-        "notices": _notices(found, devices),
+        "notices": _notices(results, devices),
         "manifest": dict(this.manifest or {}),
         "hint": hint,
         "ask_sides": guessed,
@@ -244,7 +246,7 @@ def view_inspection(
 def _as_before(
     chosen: Mapping[str, tuple[str | None, str | None]], last: LastPlaces
 ) -> dict[str, Any] | None:
-    """How many places were taken over from an earlier take and from whose, for one notice; None = none."""
+    """Number of placements taken from an earlier trial and its origin, for one notice; None = none."""
     bases = [basis for segment, basis in chosen.values() if segment]
     for basis in ("remembered", "last_take"):
         if n := bases.count(basis):
@@ -255,13 +257,13 @@ def _as_before(
 
 def _segment(
     device: Mapping[str, Any],
-    said: Mapping[str, str | None],
+    manual: Mapping[str, str | None],
     past: Mapping[str, str | None],
     usual: Mapping[str, str | None],
 ) -> tuple[str | None, str | None]:
-    """Segment to preselect and what that rests on; of a leg whose side is unknown, leg 1 is tried as left."""
-    if device["device_id"] in said:
-        return said[device["device_id"]], "manifest"
+    """Segment to preselect and its basis; for a leg of unknown side, leg 1 is assumed to be left."""
+    if device["device_id"] in manual:
+        return manual[device["device_id"]], "manifest"
     if device["declared"]:
         return device["segment"], "declared"
     if past:
@@ -298,11 +300,11 @@ def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
 
 
 def quote_id(sensor: str) -> str:
-    """The id of a sensor, which may be the name of a file, in a sentence; a segment by its name."""
+    """A sensor id in a sentence, quoted as it may be a file name; a segment by its name."""
     return SEGMENT_NAMES.get(sensor) or quote_text(UserText(sensor))
 
 
-def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+def _facts(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
     own = [d for d in devices if not d["duplicate_of"]]
     copies = len(devices) - len(own)
     rates = sorted({round(d["rate_hz"], 1) for d in own})
@@ -322,7 +324,7 @@ def _facts(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> li
     return [
         ("Sensors", str(len(own)), f"and {copies} {plural(copies, 'copy', 'copies')}" if copies else ""),
         ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
-        ("Duration", seconds(found["duration_s"]), ""),
+        ("Duration", seconds(inspection["duration_s"]), ""),
         ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),
         ("Signals", ", ".join(["acceleration", *signals]), ""),
         ("Units", "m/s², rad/s" if "gyroscope" in signals else "m/s²", _at_rest(still)),
@@ -334,8 +336,8 @@ def _at_rest(still: Sequence[float]) -> str:
     return f"(at rest {min(still):.2f} to {max(still):.2f} m/s²)" if still else ""
 
 
-def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
-    """Every notice once; copies are gathered into one sentence, unused files have their own list."""
+def _notices(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
+    """Distinct notices; file copies share one sentence, unused files are listed separately."""
     copies = [d for d in devices if d["duplicate_of"]]
     notices = []
     if copies:
@@ -349,13 +351,13 @@ def _notices(found: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> 
             f"The same samples under another id: {pairs}. Copies are not analysed unless you choose them."
         )
         notices.append({"kind": "", "title": title, "message": message})
-    everything = [*found["notices"], *(n for d in devices for n in d["notices"])]
+    everything = [*inspection["notices"], *(n for d in devices for n in d["notices"])]
     for n in everything:
         if n["code"] == DUPLICATE or n["code"] in ABOUT_FILES:
             continue
-        where = f", {quote_id(n['sensor'])}" if n["sensor"] else ""
-        title = n["code"].replace("_", " ").capitalize() + where
-        notice = {"kind": KINDS[n["severity"]], "title": title, "message": n["message"]}
+        suffix = f", {quote_id(n['sensor'])}" if n["sensor"] else ""
+        title = n["code"].replace("_", " ").capitalize() + suffix
+        notice = {"kind": KINDS[n["severity"]], "title": title, "message": read_message(n)}
         if notice not in notices:
             notices.append(notice)
     order = list(KINDS.values())

@@ -1,1 +1,1 @@
-"""Charts as SVG: curves, bars, dots, for page and paper."""
+"""SVG charts for pages and print: curves, bars, dots."""

@@ -1,4 +1,4 @@
-"""Cycle curves, range bars and the stride strip, for page and print alike (server/report/charts/svg.py)."""
+"""Cycle curves, range bars and the stride strip, for pages and print (server/report/charts/svg.py)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Side
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import find_runs
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.panels import CurvePanel, SideCurve
 from sagittal.server.report.charts.svg import (
     KEY,
@@ -25,14 +26,13 @@ from sagittal.server.report.charts.svg import (
     stretch,
 )
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 X_TICKS: Final = (0, 20, 40, 60, 80, 100)
 
 
 @dataclass(frozen=True)
 class CycleWords:
-    """What a chart goes over, what its parts are called, and the unit of its x axis."""
+    """Name of the cycle, name of its parts, and unit of the x axis."""
 
     over: str
     counted: str
@@ -58,21 +58,21 @@ def cycle_svg(
     earlier: CurvePanel | None = None,
     over: CycleWords = STRIDE,
 ) -> str:
-    """Draw one panel: band, grid, foot-off, single strides, means, cursor, words, from back to front.
+    """Draw one chart from back to front: band, grid, foot-off, single strides, means, cursor, text.
 
     Parameters
     ----------
-    height : px with margins, of which the stylesheet gives 18 above and 20 (34 with `x_unit`) below.
-    x_unit : print the unit of the x axis below; once per column. over : what the curves go over.
-    single_strides : draw thin strides, each a path with its number in the stride list as `data-stride`.
-    glance : of single strides draw at most `GLANCE_STRIDES` a side, spread over the take, and those and the
-        norm in steps of 4 %, means in steps of 2 %: a third of the bytes.
-    earlier : the same variable in an earlier session; its means are drawn thin, behind.
+    height : px including margins, which the stylesheet sets to 18 above and 20 (34 with `x_unit`) below.
+    x_unit : print the unit of the x axis; once per column. over : cycle of the curves.
+    single_strides : draw thin single strides, each a path with its index in the stride list as `data-stride`.
+    glance : draw at most `GLANCE_STRIDES` single strides per side, spread over the trial; these and the norm
+        in steps of 4 %, means in steps of 2 %, which takes a third of the bytes.
+    earlier : the same variable in an earlier session; its means are drawn thin, in the background.
 
     Returns
     -------
     str
-        A `<div class="chart cycle">`; empty when the panel has no curve.
+        A `<div class="chart cycle">`; empty if the panel has no curve.
     """
     if panel.reason is not None:
         return ""
@@ -98,10 +98,10 @@ def cycle_svg(
     plot.words(v.up, v.down)
     n = ", ".join(f"{side} mean of {c.n}" for side, c in panel.sides.items())
     last = [c.n for c in panel.sides.values()][-1:] or [0]
-    counted = plural(last[0], over.counted.removesuffix("s"), over.counted)
+    noun = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over {over.over}: {n} {counted}",
+        f"{panel.title} over {over.over}: {n} {noun}",
         f' data-variable="{v.name}"',
     )
 
@@ -112,11 +112,11 @@ def range_svg(
     scale: tuple[float, float],
     width: int = 120,
 ) -> str:
-    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean, values clipped at the ends.
+    """Draw one row of the parameter table: norm ± 1 SD as a box with its mean; values are clipped.
 
     Parameters
     ----------
-    marks : "left" a filled disc, "right" a ring, "both" a disc in ink → value.
+    marks : "left" (filled disc), "right" (ring) or "both" (dark disc) → value.
     norm : mean and standard deviation.
     """
     boxes = [] if norm is None else [(norm[0] - norm[1], norm[0] + norm[1])]
@@ -124,10 +124,10 @@ def range_svg(
 
 
 def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
-    """Draw all strides over time: stance full, swing light, left out faded with a cross, a line for now.
+    """Draw all strides over time with the cursor: stance solid, swing light, excluded ones faded and crossed.
 
-    Every stride is a `<g>`, in the order of the stride list. One left out says why; the page's script names
-    the others, which are many.
+    Every stride is a `<g>`, in the order of the stride list. Excluded strides state their reason; labels of
+    the others are added by the page's script, as there are many.
     """
     plot_height = height - 24
     marks = "".join(_stride_mark(s, duration_s) for s in strides.strides)
@@ -147,15 +147,15 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     k, top, out = KEY[s.side], 40 if s.side == "left" else 540, s.excluded_reason is not None
     start, end = round(1000 * s.start_s / duration_s), round(1000 * s.end_s / duration_s)
     off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
-    said, cross = "", ""
+    title_element, cross = "", ""
     if s.excluded_reason is not None:
         title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
-        said = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
-        across = end - start
-        cross = f'<path class="xx" d="M{start} {top + 60}l{across} 300M{start} {top + 360}l{across}-300"/>'
+        title_element = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
+        width = end - start
+        cross = f'<path class="xx" d="M{start} {top + 60}l{width} 300M{start} {top + 360}l{width}-300"/>'
     faded = " x" if out else ""
     return (
-        f"<g>{said}"
+        f"<g>{title_element}"
         f'<path class="st{k}{faded}" d="M{start} {top}H{off}v420H{start}"/>'
         f'<path class="sw{k}{faded}" d="M{off} {top}H{end}v420H{off}"/>'
         f"{cross}</g>"
@@ -191,13 +191,13 @@ class _CyclePlot(PlotArea):
         self.add(f'<path class="{css}" d="{self._path(angle[::step], step)}"/>')
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:
-        found = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
+        pct_by_side = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
         # labels stand on their lines, the earlier one to the left; close ones make room for each other
-        earlier = min(found, key=lambda side: found[side], default=None)
-        close = len(found) == 2 and max(found.values()) - min(found.values()) < _CLOSE_PCT
-        for side, x in found.items():
+        earlier = min(pct_by_side, key=lambda side: pct_by_side[side], default=None)
+        close = len(pct_by_side) == 2 and max(pct_by_side.values()) - min(pct_by_side.values()) < _CLOSE_PCT
+        for side, x in pct_by_side.items():
             self.add_upright(f"fo{KEY[side]}", 10 * x)
-            anchor, out = ("end", -1) if side == earlier and len(found) == 2 else ("start", 1)
+            anchor, out = ("end", -1) if side == earlier and len(pct_by_side) == 2 else ("start", 1)
             label = f"{side[0].upper()}\u2009{x:.0f}"
             self.add_text(
                 f"{format_coordinate(x)}%", -5, label, f"t{KEY[side]}", anchor, dx=out * (3 if close else -4)
@@ -220,18 +220,18 @@ class _CyclePlot(PlotArea):
         return [f"{10 * i} {v}" for i, v in enumerate(self._heights(angle))]
 
     def _heights(self, angle: Floats) -> list[int]:
-        """Whole thousandths of the plot from its top."""
+        """Integer thousandths of the plot from its top."""
         heights: list[int] = np.rint(1000 * (self.high - angle) / (self.high - self.low)).astype(int).tolist()
         return heights
 
     def _path(self, angle: Floats, step: int) -> str:
-        """The curve in % of the plot, interrupted where it has no value."""
-        known = find_runs(np.isfinite(angle))
-        return "".join(self._run(angle[a:b], step, a) for a, b in known)
+        """Path of a curve in % of the plot, interrupted where it has no value."""
+        runs = find_runs(np.isfinite(angle))
+        return "".join(self._run(angle[a:b], step, a) for a, b in runs)
 
     def _run(self, angle: Floats, step: int, first: int) -> str:
-        """One piece of a curve: its first point, then where each next one lies from the last."""
+        """One continuous part of a curve: its first point, then relative moves."""
         y = self._heights(angle)
-        across = 10 * step
-        moves = " ".join([f"{across}{b - a:+d}" for a, b in pairwise(y)])
+        step_x = 10 * step
+        moves = " ".join([f"{step_x}{b - a:+d}" for a, b in pairwise(y)])
         return f"M{10 * step * first} {y[0]}" + (f"l{moves}" if moves else "")

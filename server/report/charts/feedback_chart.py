@@ -1,7 +1,7 @@
-"""Draws a take with feedback: every stride over the zone of its level, filled with feedback, open without.
+"""Chart of a trial with feedback: strides over the zone of their level, solid with feedback, open without.
 
-The rules are those of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and text do
-not.
+Follows the conventions of the cycle curves (server/report/charts/svg.py): the plot stretches, dots and text
+do not.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ NARROW: Final = 50.0
 
 
 def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str:
-    """Draw the strides in their order.
+    """Draw the strides in order.
 
     Parameters
     ----------
@@ -47,8 +47,8 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
             left, width = x(i - 0.5), x(j + 0.5) - x(i - 0.5)
             plot.add_column("fb-block", left, width)
             if width >= NARROW:
-                at = f"{format_coordinate((left + width / 2) / 10)}%"
-                plot.add_text(at, plot.height + 14, word, "words", "middle")
+                x_text = f"{format_coordinate((left + width / 2) / 10)}%"
+                plot.add_text(x_text, plot.height + 14, word, "words", "middle")
     for i, j, m in _runs(strides, lambda m: (m.cue.zone_low, m.cue.zone_high)):
         plot.add_band("band", m.cue.zone_low, m.cue.zone_high, x(i - 0.5), x(j + 0.5) - x(i - 0.5))
     ticks, digits = find_round_ticks(low, high)
@@ -62,38 +62,38 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         plot.add_dot(x(i), min(max(m.value, low), high), css, 2.6)
     for i, j, m in _runs(strides, lambda m: (_opens(m), m.cue.level)):
         if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
-            at = f"{format_coordinate(x(i - 0.5) / 10)}%"
-            plot.add_text(at, plot.height + 28, f"level {m.cue.level}", "words", "start")
+            x_text = f"{format_coordinate(x(i - 0.5) / 10)}%"
+            plot.add_text(x_text, plot.height + 28, f"level {m.cue.level}", "words", "start")
     title = f"{term.label} of every stride over the zone of its level; the table has the numbers"
     return plot.draw("chart fb-plot", title)
 
 
 def _opens(m: MatchedStride) -> bool:
-    """The stride is of the block a visit begins with, which may have no level yet."""
+    """Whether the stride belongs to the opening block of a visit, which may have no level yet."""
     return m.cue.why_not in {"baseline", "retention"}
 
 
 def _block(m: MatchedStride) -> str:
-    """Word of a block without feedback, "" in training."""
-    why = m.cue.why_not
-    if why == "baseline":
+    """Name of a block without feedback, "" in training."""
+    reason = m.cue.why_not
+    if reason == "baseline":
         return "before"
-    return why if why in {"probe", "retention"} else ""
+    return reason if reason in {"probe", "retention"} else ""
 
 
 def _runs(
     strides: Sequence[MatchedStride], key: Callable[[MatchedStride], object]
 ) -> Iterator[tuple[int, int, MatchedStride]]:
-    """First and last number of strides in a row with the same key, and the first of them."""
+    """First and last index of consecutive strides with the same key, and the first stride."""
     start = 0
     for _, group in groupby(strides, key):
-        found = list(group)
-        yield start, start + len(found) - 1, found[0]
-        start += len(found)
+        members = list(group)
+        yield start, start + len(members) - 1, members[0]
+        start += len(members)
 
 
 def _range(strides: Sequence[MatchedStride], content: Prescription) -> tuple[float, float]:
-    """Ends of the value axis: zones and values, but not what lies far off."""
+    """Limits of the value axis: zones and values, excluding distant outliers."""
     low = min(m.cue.zone_low for m in strides)
     high = max(m.cue.zone_high for m in strides)
     width = (content.target.sd or 0.0) * content.progression.sd_per_level or (high - low)

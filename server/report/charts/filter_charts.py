@@ -28,11 +28,11 @@ AGREEMENT_HEIGHT: Final = 240
 
 
 def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end: float, over: Over) -> str:
-    """Draw the standard deviation between filters in degrees, by side or (None) of both.
+    """Draw the standard deviation between filters in degrees, by side, or (None) for both.
 
     Parameters
     ----------
-    top : of the value axis, shared by neighbours. end : of the time axis in s; the cycle ends at 100 %.
+    top : upper limit of the value axis, shared by adjacent charts. end : of the time axis in s, or 100 %.
     """
     plot = PlotArea((0.0, top), HEIGHT - TOP - BOTTOM)
     ticks, digits = find_round_ticks(0.0, top)
@@ -50,7 +50,7 @@ def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end
 
 
 def _path(plot: PlotArea, values: Floats) -> str:
-    """A curve over the whole width, interrupted where it has no value."""
+    """A curve over the full width, interrupted where it has no value."""
     x = np.linspace(0.0, 1000.0, len(values))
     return "".join(
         "M"
@@ -62,7 +62,7 @@ def _path(plot: PlotArea, values: Floats) -> str:
 def draw_agreement(
     title: str, middle: Sequence[float], difference: Sequence[float], levels: Sequence[float]
 ) -> str:
-    """Draw a Bland–Altman plot in degrees: differences over the mean of both, bias and its limits as lines.
+    """Draw a Bland–Altman plot in degrees: difference over mean, with bias and limits of agreement as lines.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Cycle curves as they are drawn and tabled: degrees, left and right, the norm where comparable."""
+"""Cycle curves for charts and tables: degrees, left and right, with norms where comparable."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ DRAWN_STRIDES: Final = 40
 
 @dataclass(frozen=True, eq=False)
 class SideCurve:
-    """One side of one variable.
+    """Curve of one side of one variable.
 
     Parameters
     ----------
-    mean_deg, sd_deg : (101,) over the counted strides; None without strides, sd also with one. NaN where the
-        leg model's knee rests on its limit in most strides.
-    n : strides behind the mean. strides : index in the stride list → (101,) deg, counted strides to draw, NaN
-        where they rest there.
-    foot_off_pct, foot_off_sd : terminal contact, % of cycle, None if not found.
+    mean_deg, sd_deg : (101,) over the included strides; None without strides, sd also with one. NaN where the
+        knee of the leg model is at its limit in most strides.
+    n : number of strides in the mean. strides : index in the stride list → (101,) deg, included strides to
+        draw, NaN where the knee is at its limit.
+    foot_off_pct, foot_off_sd : foot-off, % of cycle, None if not detected.
     """
 
     mean_deg: Floats | None
@@ -65,14 +65,14 @@ class CurvePanel:
 
     Parameters
     ----------
-    title : with the zero in words, "Knee flexion, from standing".
-    zero : what the curves are measured from, None without angles. added_deg : what of it a goniometer read,
-        by side, and was added; empty from standing.
-    low_confidence : frontal and transverse planes, and joints without a sensor on both of their segments.
+    title : including the zero, "Knee flexion, from standing".
+    zero : zero of the curves, None without angles. added_deg : goniometer reading added to it, by side; empty
+        if relative to standing.
+    low_confidence : frontal and transverse planes, and joints without a sensor on both segments.
     reason : why there is no curve, None if there is one.
-    norm : band to draw, of the same zero; None where there is none. norm_note : what must be said about it,
-        or why there is none though a norm exists.
-    comfortable : the same people's band at their comfortable speed, where `norm` is at the person's own.
+    norm : band with the same zero; None if there is none. norm_note : remarks on the norm, or why an existing
+        norm is not shown.
+    comfortable : band of the same group at comfortable speed, if `norm` is at the patient's speed.
     """
 
     variable: Variable
@@ -90,40 +90,41 @@ class CurvePanel:
 def curve_panels(
     bundle: Bundle, curves: CycleCurves | None, norms: Norms, own: Norms | None = None
 ) -> tuple[CurvePanel, ...]:
-    """All panels in reading order; a variable without a curve keeps its place and says why.
+    """All panels in display order; a variable without a curve keeps its place with a reason.
 
-    Where a goniometer was used on both sides the curves are anatomical, else from standing.
+    Curves are anatomical if a goniometer was used on both sides, otherwise relative to standing.
 
     Parameters
     ----------
     curves : of the bundle's angles over its strides, None without angles.
-    norms, own : published reference, and the clinic's own controls; the first that has a band of the same
-        zero gives it, to a variable that sensors measure.
+    norms, own : published reference, and the clinic's own controls; the first with a band of the same zero is
+        used, for measured variables only.
     """
     estimated = list_estimated_variables(bundle.estimator)
     standing = {} if bundle.angles is None else bundle.angles.standing_deg
     level = set(anatomical_variables(standing)).difference(estimated)
-    known = () if own is None else (own.bands,)
-    found = []
+    band_sets = () if own is None else (own.bands,)
+    panels = []
     for v in VARIABLES:
-        bands = [b for by_name in (norms.bands, *known) if (b := by_name.get(v.name)) is not None]
+        bands = [b for by_name in (norms.bands, *band_sets) if (b := by_name.get(v.name)) is not None]
         added = {s: standing_offset_deg(v.name, s, standing) for s in SIDES} if v.name in level else {}
         panel = _panel(v, curves, added, bands, sure=v.name not in estimated)
         if panel.norm is not None and panel.norm is norms.bands.get(v.name):
             panel = replace(panel, comfortable=norms.comfortable_bands.get(v.name))
-        found.append(panel)
-    return tuple(found)
+        panels.append(panel)
+    return tuple(panels)
 
 
-def same_zero(before: CurvePanel, after: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
-    """Two panels of a variable to be drawn in one: both from standing unless both are anatomical; the earlier
-    one without curves where only one of them comes from a take in which somebody stood."""
-    if before.zero == after.zero or None in (before.zero, after.zero):
-        return before, after
-    if "walking" in (before.zero, after.zero):
+def same_zero(earlier: CurvePanel, later: CurvePanel) -> tuple[CurvePanel, CurvePanel]:
+    """Convert two panels of a variable to a common zero: relative to standing unless both are anatomical. The
+    earlier one loses its curves if only one trial includes quiet standing.
+    """
+    if earlier.zero == later.zero or None in (earlier.zero, later.zero):
+        return earlier, later
+    if "walking" in (earlier.zero, later.zero):
         # a curve without a level is not drawn over one that has one
-        return replace(before, sides={}, reason=reason_words("no_standing")), after
-    return _from_standing(before), _from_standing(after)
+        return replace(earlier, sides={}, reason=reason_words("no_standing")), later
+    return _from_standing(earlier), _from_standing(later)
 
 
 def _from_standing(panel: CurvePanel) -> CurvePanel:
@@ -181,7 +182,7 @@ def _title(variable: Variable, zero: Zero | None) -> str:
 
 
 def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
-    """The curve with its zero moved."""
+    """The curve with a shifted zero."""
     if by_deg == 0.0 or curve.mean_deg is None:
         return curve
     strides = {i: row + by_deg for i, row in curve.strides.items()}
@@ -191,8 +192,8 @@ def _moved(curve: SideCurve, by_deg: float) -> SideCurve:
 def _why_missing(variable: Variable, curves: CycleCurves | None) -> str:
     if curves is None:
         return reason_words("not_reached")
-    why = next(iter(curves.why.get(variable.name, {}).values()), None)
-    return reason_words(why or ("no_strides" if variable.name in curves.curves else "joint_missing"))
+    reason = next(iter(curves.why.get(variable.name, {}).values()), None)
+    return reason_words(reason or ("no_strides" if variable.name in curves.curves else "joint_missing"))
 
 
 def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
@@ -201,14 +202,14 @@ def _side(curves: CycleCurves, name: str, side: Side) -> SideCurve:
     strides: dict[int, Floats] = {}
     off = np.empty(0)
     if rows is not None and mean.n:
-        counted = np.flatnonzero(curves.used[side] & np.isfinite(rows).all(axis=1))
-        off = curves.foot_off_pct[side][counted]
+        included = np.flatnonzero(curves.used[side] & np.isfinite(rows).all(axis=1))
+        off = curves.foot_off_pct[side][included]
         off = off[np.isfinite(off)]
-        if len(counted) > DRAWN_STRIDES:
-            counted = counted[np.linspace(0, len(counted) - 1, DRAWN_STRIDES).round().astype(np.int64)]
-        drawn, index = rows[counted], curves.stride_index[side]
-        shown = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
-        strides = {index[i]: row for i, row in zip(counted, shown, strict=True)}
+        if len(included) > DRAWN_STRIDES:
+            included = included[np.linspace(0, len(included) - 1, DRAWN_STRIDES).round().astype(np.int64)]
+        drawn, index = rows[included], curves.stride_index[side]
+        values = np.where(rest_at_bound(curves, name, side, drawn), np.nan, np.degrees(drawn))
+        strides = {index[i]: row for i, row in zip(included, values, strict=True)}
     foot_off, foot_off_sd = mean_and_sd(off) if len(off) else (None, None)
     return SideCurve(
         mean_deg=None if mean.mean is None else np.degrees(mean.mean),

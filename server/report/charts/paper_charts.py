@@ -1,4 +1,4 @@
-"""Figures of a page as a renderer of paper needs them, which knows no style of the page inside of an `<svg>`.
+"""Prepares charts for a print renderer, which does not apply the page's styles inside an `<svg>`.
 
 On a page charts stretch with their column, strokes keep their width, and colours come from the design tokens
 (server/report/charts/svg.py). Here each chart gets its width in px, its shapes are moved to it, the margins
@@ -35,13 +35,13 @@ _NOT_HERE: Final = ("vector-effect", "paint-order", "cursor", "font-variant-nume
 
 @dataclass(frozen=True)
 class ChartStyles:
-    """What style sheets say of charts.
+    """Chart-related part of style sheets.
 
     Parameters
     ----------
-    rules : the rules for what is inside of a chart, colours written out.
+    rules : rules for elements within a chart, with colours resolved.
     margins : class of a chart → top, right, bottom, left in px.
-    tokens : design tokens as paper has them.
+    tokens : design tokens for print.
     """
 
     rules: str
@@ -59,29 +59,29 @@ def read_chart_styles(styles: str) -> ChartStyles:
             s.strip().removeprefix(".chart ") for s in selectors.split(",") if s.strip().startswith(".chart ")
         ]
         if inside and not any("halo" in s for s in inside):
-            said = [d.strip() for d in body.split(";") if d.strip()]
-            said = [d for d in said if d.split(":")[0] not in _NOT_HERE]
-            rules.append(f"{', '.join(inside)} {{ {_write_out('; '.join(said), tokens)} }}")
+            declarations = [d.strip() for d in body.split(";") if d.strip()]
+            declarations = [d for d in declarations if d.split(":")[0] not in _NOT_HERE]
+            rules.append(f"{', '.join(inside)} {{ {_write_out('; '.join(declarations), tokens)} }}")
         margin = re.search(r"padding:([^;]+)", body)
         if margin is not None and (chart := re.fullmatch(r"\.chart\.([\w-]+)", selectors.strip())):
             margins[chart[1]] = _read_margin(margin[1])
-        below = re.search(r"padding-bottom:\s*([\d.]+)px", body)
-        if below is not None and (chart := re.fullmatch(r"\.chart\.([\w-]+)\.([\w-]+)", selectors.strip())):
+        padding = re.search(r"padding-bottom:\s*([\d.]+)px", body)
+        if padding is not None and (chart := re.fullmatch(r"\.chart\.([\w-]+)\.([\w-]+)", selectors.strip())):
             top, right, _, left = margins[chart[1]]
-            margins[chart[2]] = (top, right, float(below[1]), left)
+            margins[chart[2]] = (top, right, float(padding[1]), left)
     return ChartStyles("\n".join(rules), margins, tokens)
 
 
 def prepare_figures(page: Element, styles: ChartStyles) -> None:
-    """Rewrite every figure of a page in its tree."""
+    """Rewrite all charts in the tree of a page."""
     parents = {child: parent for parent in page.iter() for child in parent}
     symbols = {s.get("id"): s for s in page.iter(f"{SVG}symbol")}
     patterns = list(page.iter(f"{SVG}pattern"))
     for figure in [f for f in page.iter(f"{SVG}svg") if not parents[f].tag.startswith(SVG)]:
-        above = [figure]
-        while above[-1] in parents:
-            above.append(parents[above[-1]])
-        classes = [_classes(e) for e in above]
+        ancestors = [figure]
+        while ancestors[-1] in parents:
+            ancestors.append(parents[ancestors[-1]])
+        classes = [_classes(e) for e in ancestors]
         if classes[0] & {"sprite", "patterns"}:
             parents[figure].remove(figure)
             continue
@@ -119,7 +119,7 @@ def _draw_chart(figure: Element, classes: list[set[str]], styles: ChartStyles) -
 
 
 def _fix_size(figure: Element, width: float, height: float) -> None:
-    """Give what is measured in parts of the plot area its place in px."""
+    """Convert relative sizes and positions of a plot area to px."""
     for part in list(figure):
         if part.get("hidden") is not None or "cursor" in _classes(part):
             figure.remove(part)
@@ -153,21 +153,21 @@ def _stretch(group: Element, x: float, y: float) -> None:
 
 
 def stretch_path(path: str, x: float, y: float) -> str:
-    """A path of straight lines (M L H V, their small letters, Z), each number times that of its axis.
+    """Scale a path of straight lines (M L H V, lower case too, Z) along each axis.
 
     >>> stretch_path("M0 500l20-10H40v5z", 0.5, 2.0)
     'M 0.00 1000.00 l 10.00 -20.00 H 20.00 v 10.00 z'
     """
-    command, count, said = "", 0, []
+    command, count, tokens = "", 0, []
     for step in _STEP.findall(path):
         if step.isalpha():
             command, count = step.upper(), 0
-            said.append(step)
+            tokens.append(step)
             continue
         along = command == "H" or (command != "V" and count % 2 == 0)
-        said.append(f"{float(step) * (x if along else y):.2f}")
+        tokens.append(f"{float(step) * (x if along else y):.2f}")
         count += 1
-    return " ".join(said)
+    return " ".join(tokens)
 
 
 def _inline_symbol(figure: Element, symbols: Mapping[str | None, Element]) -> None:
@@ -185,15 +185,15 @@ def _classes(element: Element) -> set[str]:
 
 
 def _write_out(text: str, tokens: Mapping[str, str]) -> str:
-    while (found := re.search(r"var\((--[\w-]+)\)", text)) is not None:
-        text = text.replace(found[0], tokens.get(found[1], "inherit"))
+    while (match := re.search(r"var\((--[\w-]+)\)", text)) is not None:
+        text = text.replace(match[0], tokens.get(match[1], "inherit"))
     return text
 
 
 def _read_margin(text: str) -> tuple[float, float, float, float]:
-    """The four lengths of a `padding` in px."""
-    found = [float(n.removesuffix("px")) for n in text.split() if re.fullmatch(r"[\d.]+(px)?", n)]
-    top = found[0] if found else 0.0
-    right = found[1] if len(found) > 1 else top
-    bottom = found[2] if len(found) > 2 else top
-    return top, right, bottom, found[3] if len(found) > 3 else right
+    """Parse the four lengths of a `padding` in px."""
+    lengths = [float(n.removesuffix("px")) for n in text.split() if re.fullmatch(r"[\d.]+(px)?", n)]
+    top = lengths[0] if lengths else 0.0
+    right = lengths[1] if len(lengths) > 1 else top
+    bottom = lengths[2] if len(lengths) > 2 else top
+    return top, right, bottom, lengths[3] if len(lengths) > 3 else right

@@ -1,4 +1,4 @@
-"""Where the words of a cycle chart stand on paper, where letters have no light edge: clear of its curves."""
+"""Placement of text in printed cycle charts, where it has no light outline: clear of the curves."""
 
 from __future__ import annotations
 
@@ -30,27 +30,27 @@ Box = tuple[float, float, float, float]
 
 
 def place_words(figure: Element, width: float, height: float, left: float) -> None:
-    """Move the words of a chart along its upper or lower edge to where they touch least.
+    """Move the labels of a chart along its upper or lower edge to the place with least overlap.
 
-    The upper word goes above the plot where no place inside is clear and the foot-offs leave room.
+    The upper label is moved above the plot if no place inside is clear and the foot-off marks leave space.
 
     Parameters
     ----------
-    figure : of fixed size, px. width, height : of its plot area. left : margin.
+    figure : chart of fixed size, px. width, height : of its plot area. left : margin.
     """
     curves = [
         p for part in figure.iter(f"{SVG}path") if _is_of(part, CURVES) for p in _sample(part.get("d", ""))
     ]
     uprights = [float(e.get("x1", "0")) for e in figure.iter(f"{SVG}line") if _is_of(e, UPRIGHTS)]
-    others = [_box_of(t) for t in figure.iter(f"{SVG}text") if _is_of(t, {"tl", "tr"})]
+    label_boxes = [_box_of(t) for t in figure.iter(f"{SVG}text") if _is_of(t, {"tl", "tr"})]
     for word in figure.iter(f"{SVG}text"):
         if not _is_of(word, {"words"}) or word.get("text-anchor") != "start":
             continue
         first = _box_of(word)
         is_upper = first[3] < height / 2
         best = _find_place(first, width, OUTWARDS_PX[is_upper], curves, uprights)
-        above = (-left, ABOVE_PLOT - ABOVE_PX, first[2] - first[0] - left, ABOVE_PLOT + BELOW_PX)
-        if is_upper and best.touched and not any(_overlap(above, other) for other in others):
+        box_above = (-left, ABOVE_PLOT - ABOVE_PX, first[2] - first[0] - left, ABOVE_PLOT + BELOW_PX)
+        if is_upper and best.touched and not any(_overlap(box_above, label_box) for label_box in label_boxes):
             best = _Place(0, -left, ABOVE_PLOT)
         word.set("x", f"{best.x:g}")
         word.set("y", f"{best.base:g}")
@@ -59,7 +59,7 @@ def place_words(figure: Element, width: float, height: float, left: float) -> No
 
 
 class _Place(NamedTuple):
-    """Where a line of text can begin, px, and how many px of lines it would lie on."""
+    """Candidate position of a line of text, px, and the length of lines it would cover, px."""
 
     touched: int
     x: float
@@ -73,7 +73,7 @@ def _find_place(
     curves: Sequence[tuple[float, float]],
     uprights: Sequence[float],
 ) -> _Place:
-    """The place that touches least; of equal ones the least outwards, then the leftmost."""
+    """The place with least overlap; among equal ones the innermost, then the leftmost."""
     long, begin = first[2] - first[0], round(first[0])
     places = range(begin, max(int(width - long), begin) + 1, STEP_PX)
     best: _Place | None = None
@@ -90,7 +90,7 @@ def _find_place(
 
 
 def _count_touches(box: Box, curves: Sequence[tuple[float, float]], uprights: Sequence[float]) -> int:
-    """How many px of curves lie in a box, and a line from bottom to top as all of its height."""
+    """Length in px of curves within a box; a vertical line counts with the full height of the box."""
     low, top, high, bottom = box[0] - ROOM_PX, box[1] - ROOM_PX, box[2] + ROOM_PX, box[3] + ROOM_PX
     return sum(low <= x <= high and top <= y <= bottom for x, y in curves) + sum(
         round(bottom - top) for x in uprights if low <= x <= high
@@ -110,13 +110,13 @@ def _box_of(text: Element) -> Box:
 
 
 def _sample(path: str) -> Iterator[tuple[float, float]]:
-    """Points about a px apart on a path of M, L and l, as `paper_charts.stretch_path` writes it."""
+    """Points about one px apart on a path of M, L and l, as written by `paper_charts.stretch_path`."""
     command, x, y = "M", 0.0, 0.0
-    for letter, across, down in _STEP.findall(path):
+    for letter, dx, down in _STEP.findall(path):
         if letter:
             command = letter
             continue
-        ends = (x + float(across), y + float(down)) if command == "l" else (float(across), float(down))
+        ends = (x + float(dx), y + float(down)) if command == "l" else (float(dx), float(down))
         steps = 1 if command == "M" else max(1, round(max(abs(ends[0] - x), abs(ends[1] - y))))
         for k in range(1, steps + 1):
             yield x + (ends[0] - x) * k / steps, y + (ends[1] - y) * k / steps

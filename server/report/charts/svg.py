@@ -1,9 +1,9 @@
-"""What all charts are drawn with: the plot area, its axes, text and dots, and the bar of a table row.
+"""Common elements of charts: plot area, axes, text and dots, and the bar of a table row.
 
-The margins of a chart are the padding of its `<div>`; the `<svg>` is the plot area. What is measured lives in
-a nested `viewBox="0 0 1000 1000"` that stretches while strokes and text do not; labels are placed in percent
-and px. Colours, widths and dashes come from CSS classes only (design tokens), so light, dark and paper need
-no second drawing.
+The margins of a chart are the padding of its `<div>`; the `<svg>` is the plot area. Data are drawn in a
+nested `viewBox="0 0 1000 1000"` that stretches, while strokes and text keep their size; labels are placed in
+percent and px. Colours, widths and dashes are set by CSS classes only (design tokens), so light, dark and
+print share one drawing.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def format_coordinate(value: float) -> str:
 
 
 def make_label(x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> str:
-    """Make a label; `x` with its unit, "12%" or "0", the rest in px."""
+    """Create a label; `x` with its unit, "12%" or "0", other coordinates in px."""
     named = f' class="{css}"' if css else ""
     return (
         f'<text{named} x="{x}" y="{format_coordinate(y)}" dx="{dx}" dy="{dy}" text-anchor="{anchor}">'
@@ -42,9 +42,9 @@ def make_label(x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, 
 
 
 def find_round_ticks(low: float, high: float) -> tuple[list[float], int]:
-    """Return the multiples of 1, 2 or 5 · 10ⁿ on an axis, at most about TICKS, and the decimals they need.
+    """Return the multiples of 1, 2 or 5 · 10ⁿ on an axis, at most about TICKS, and the required decimals.
 
-    `web/static/js/common/ticks.js` is the same for what browsers draw.
+    `web/static/js/common/ticks.js` is the equivalent for browsers.
     """
     raw = (high - low) / TICKS
     power = 10.0 ** math.floor(math.log10(raw))
@@ -54,7 +54,7 @@ def find_round_ticks(low: float, high: float) -> tuple[list[float], int]:
 
 
 def make_time_labels(duration_s: float, y: float, dy: int) -> str:
-    """Make the labels of a time axis from 0, at most a dozen up to two minutes."""
+    """Create the labels of a time axis from 0, at most a dozen up to two minutes."""
     step = next((s for s in (1, 2, 5, 10, 30, 60) if duration_s / s <= 12), 120)
     return "".join(
         make_label(f"{format_coordinate(100 * t / duration_s)}%", y, f"{t}\u2009s", "", "middle", dy=dy)
@@ -63,7 +63,7 @@ def make_time_labels(duration_s: float, y: float, dy: int) -> str:
 
 
 def stretch(shapes: str) -> str:
-    """Return shapes of 0 to 1000 both ways as they fill the plot area."""
+    """Return shapes with coordinates 0 to 1000 stretched to the plot area."""
     return (
         '<svg viewBox="0 0 1000 1000" preserveAspectRatio="none" width="100%" height="100%" '
         f'overflow="hidden">{shapes}</svg>'
@@ -77,12 +77,12 @@ def draw_bar(
     scale: tuple[float, float],
     width: int,
 ) -> str:
-    """Draw the bar of a table row: boxes of healthy people with their middle as a line, values as marks.
+    """Draw the bar of a table row: norm ranges as boxes with their centre as a line, values as marks.
 
     Parameters
     ----------
-    marks : "left", "right", "both" → value. boxes : low and high, the back one first; what lies beyond the
-        ends of `scale` is drawn at the end. width : px.
+    marks : "left", "right", "both" → value. boxes : low and high, the rear one first; values outside `scale`
+        are drawn at its end. width : px.
     """
 
     def x(value: float) -> float:
@@ -98,10 +98,10 @@ def draw_bar(
         )
     if middle is not None:
         parts.append(f'<line class="nm" x1="{f(x(middle))}" x2="{f(x(middle))}" y1="5" y2="21"/>')
-    shown = {str(name): value for name, value in marks.items()}
+    values = {str(name): value for name, value in marks.items()}
     for mark, css, radius in BAR_MARKS:
-        if mark in shown:
-            parts.append(f'<circle class="{css}" cx="{f(x(shown[mark]))}" cy="13" r="{radius}"/>')
+        if mark in values:
+            parts.append(f'<circle class="{css}" cx="{f(x(values[mark]))}" cy="13" r="{radius}"/>')
     return (
         f'<svg class="chart range" width="{width}" height="26" viewBox="0 0 {width} 26" aria-hidden="true">'
         f"{''.join(parts)}</svg>"
@@ -109,7 +109,7 @@ def draw_bar(
 
 
 class PlotArea:
-    """Collects what stretches (0 to 1000 both ways) and what does not (percent and px), from back to front.
+    """Collects stretching shapes (0 to 1000 both ways) and fixed ones (percent and px), from back to front.
 
     Parameters
     ----------
@@ -123,29 +123,29 @@ class PlotArea:
         self._fixed: list[str] = []
 
     def y(self, value: float) -> float:
-        """Height of a value, 0 at the top to 1000."""
+        """Vertical position of a value, 0 at the top to 1000."""
         return 1000 - 1000 * (value - self.low) / (self.high - self.low)
 
     def px(self, value: float) -> float:
-        """Height of a value in px from the top."""
+        """Vertical position of a value in px from the top."""
         return self.y(value) / 1000 * self.height
 
     def add(self, shape: str) -> None:
-        """Add a shape that stretches."""
+        """Add a stretching shape."""
         self._stretched.append(shape)
 
     def add_level(self, css: str, value: float) -> None:
-        """Add a line across at a value."""
+        """Add a horizontal line at a value."""
         y = format_coordinate(self.y(value))
         self.add(f'<line class="{css}" x1="0" x2="1000" y1="{y}" y2="{y}"/>')
 
     def add_upright(self, css: str, x: float) -> None:
-        """Add a line from bottom to top at 0 to 1000 of the width."""
-        at = format_coordinate(x)
-        self.add(f'<line class="{css}" x1="{at}" x2="{at}" y1="0" y2="1000"/>')
+        """Add a vertical line at 0 to 1000 of the width."""
+        position = format_coordinate(x)
+        self.add(f'<line class="{css}" x1="{position}" x2="{position}" y1="0" y2="1000"/>')
 
     def add_band(self, css: str, low: float, high: float, x: float = 0.0, width: float = 1000.0) -> None:
-        """Add a band between two values, across or over a part of the width."""
+        """Add a band between two values, over all or part of the width."""
         top, bottom = self.y(high), self.y(low)
         f = format_coordinate
         self.add(
@@ -153,32 +153,32 @@ class PlotArea:
         )
 
     def add_column(self, css: str, x: float, width: float) -> None:
-        """Add a column over the whole height."""
+        """Add a column over the full height."""
         f = format_coordinate
         self.add(f'<rect class="{css}" x="{f(x)}" width="{f(width)}" y="0" height="1000"/>')
 
     def add_tick(self, css: str, value: float, label: str) -> None:
-        """Add a grid line with its label beside the axis."""
+        """Add a grid line with its axis label."""
         self.add_level(css, value)
         self.add_text("0", self.px(value), label, "", "end", dx=-7, dy=4)
 
     def add_text(self, x: str, y: float, text: str, css: str, anchor: str, dx: int = 0, dy: int = 0) -> None:
-        """Add a label; as `make_label`."""
+        """Add a label, like `make_label`."""
         self._fixed.append(make_label(x, y, text, css, anchor, dx, dy))
 
     def add_fixed(self, labels: str) -> None:
-        """Add labels that are made already."""
+        """Add existing labels."""
         self._fixed.append(labels)
 
     def add_dot(self, x: float, value: float, css: str, radius: float) -> None:
-        """Add a dot that stays round, at 0 to 1000 of the width."""
+        """Add a dot that remains circular, at 0 to 1000 of the width."""
         self._fixed.append(
             f'<svg x="{format_coordinate(x / 10)}%" y="{format_coordinate(self.px(value))}" '
             f'overflow="visible" width="1" height="1"><circle class="{css}" r="{radius}"/></svg>'
         )
 
     def draw(self, css: str, title: str, attributes: str = "") -> str:
-        """Return the chart in a `<div>` of this class, with a title for those who hear the page."""
+        """Return the chart in a `<div>` with this class, with a title for screen readers."""
         return (
             f'<div class="{css}"{attributes}>'
             f'<svg width="100%" height="{self.height}" overflow="visible" role="img">'

@@ -1,1 +1,1 @@
-"""The files an analysis yields, written and read back."""
+"""Result files of an analysis: writers and readers."""

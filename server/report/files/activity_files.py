@@ -1,9 +1,9 @@
-"""The files of a take of daily life, written and read back (what they hold: core/activity/result.py).
+"""Result files of a daily-life recording (for their content see core/activity/result.py).
 
 activity.json              device, periods of wear, days, hours, transitions, candidates, bouts, turns
-activity_spans.parquet     the day from end to end: start_s, end_s, kind, confidence, evidence
+activity_spans.parquet     the entire day: start_s, end_s, kind, confidence, evidence
 activity_spans.csv         the same as text
-activity_inclination.parquet  t_s (whole seconds) and inclination_deg, null where it is not known
+activity_inclination.parquet  t_s (whole seconds) and inclination_deg, null if unknown
 activity_steps.parquet     time_s of every step
 transitions.csv            transitions and candidates in order of time
 walking_bouts.csv          walking bouts
@@ -52,64 +52,64 @@ INCLINATION: Final = "activity_inclination.parquet"
 STEPS: Final = "activity_steps.parquet"
 
 
-def write_activity(found: ActivityResult) -> dict[str, bytes]:
-    """Write what the monitor found as files, name → bytes."""
+def write_activity(result: ActivityResult) -> dict[str, bytes]:
+    """Write the result of activity monitoring as files, name → bytes."""
     return {
-        NAME: json.dumps(summarise_activity(found), ensure_ascii=False, allow_nan=False, indent=1).encode(),
-        SPANS: _spans_parquet(found.spans),
+        NAME: json.dumps(summarise_activity(result), ensure_ascii=False, allow_nan=False, indent=1).encode(),
+        SPANS: _spans_parquet(result.spans),
         INCLINATION: parquet_file(
-            np.arange(len(found.inclination_deg), dtype=np.float64),
-            {"inclination_deg": found.inclination_deg.astype(np.float32)},
+            np.arange(len(result.inclination_deg), dtype=np.float64),
+            {"inclination_deg": result.inclination_deg.astype(np.float32)},
             {"schema": SCHEMA, "positive": "forward"},
         ),
-        STEPS: _one_column("time_s", found.steps_s),
+        STEPS: _one_column("time_s", result.steps_s),
         "activity_spans.csv": write_csv(
             ("start_s", "end_s", "kind", "confidence", "evidence"),
-            ((s.start_s, s.end_s, s.kind, s.confidence, s.evidence) for s in found.spans),
+            ((s.start_s, s.end_s, s.kind, s.confidence, s.evidence) for s in result.spans),
         ),
-        "transitions.csv": _transitions_csv(found),
+        "transitions.csv": _transitions_csv(result),
         "walking_bouts.csv": write_csv(
             ("start_s", "end_s", "kind", "steps", "stairs_up_steps", "stairs_down_steps", "cadence_spm"),
             (
                 (b.start_s, b.end_s, b.kind, b.steps, b.stairs_up_steps, b.stairs_down_steps, b.cadence_spm)
-                for b in found.bouts
+                for b in result.bouts
             ),
         ),
         "activity_hours.csv": write_csv(
             ("start_s", "end_s", "steps", *(f"{kind}_min" for kind in KINDS)),
-            ((h.start_s, h.end_s, h.steps, *(h.minutes.get(k, 0.0) for k in KINDS)) for h in found.hours),
+            ((h.start_s, h.end_s, h.steps, *(h.minutes.get(k, 0.0) for k in KINDS)) for h in result.hours),
         ),
     }
 
 
-def summarise_activity(found: ActivityResult) -> dict[str, object]:
-    """Content of activity.json: all but spans, steps and the inclination, which are columns."""
+def summarise_activity(result: ActivityResult) -> dict[str, object]:
+    """Content of activity.json: everything except spans, steps and inclination, which have own files."""
     return {
         "schema": SCHEMA,
-        "segment": found.segment,
-        "device_id": found.device_id,
-        "source": found.source,
-        "rate_hz": found.rate_hz,
-        "has_gyro": found.has_gyro,
-        "started_at": None if found.started_at is None else found.started_at.isoformat(),
-        "duration_s": found.duration_s,
-        "height_m": found.height_m,
-        "steps": len(found.steps_s),
-        "minutes": {kind: found.minutes(kind) for kind in KINDS},
-        "sub_threshold": len(found.sub_threshold),
-        "periods": [_plain(p) for p in found.periods],
-        "days": [{**_plain(d), "date": None if d.date is None else d.date.isoformat()} for d in found.days],
-        "hours": [_plain(h) for h in found.hours],
-        "transitions": [_plain(t) for t in found.transitions],
-        "candidates": [_plain(c) for c in found.candidates],
-        "bouts": [_plain(b) for b in found.bouts],
-        "turns": list_turns(found.turns),
-        "notices": [n.to_json() for n in found.notices],
+        "segment": result.segment,
+        "device_id": result.device_id,
+        "source": result.source,
+        "rate_hz": result.rate_hz,
+        "has_gyro": result.has_gyro,
+        "started_at": None if result.started_at is None else result.started_at.isoformat(),
+        "duration_s": result.duration_s,
+        "height_m": result.height_m,
+        "steps": len(result.steps_s),
+        "minutes": {kind: result.minutes(kind) for kind in KINDS},
+        "sub_threshold": len(result.sub_threshold),
+        "periods": [_plain(p) for p in result.periods],
+        "days": [{**_plain(d), "date": None if d.date is None else d.date.isoformat()} for d in result.days],
+        "hours": [_plain(h) for h in result.hours],
+        "transitions": [_plain(t) for t in result.transitions],
+        "candidates": [_plain(c) for c in result.candidates],
+        "bouts": [_plain(b) for b in result.bouts],
+        "turns": list_turns(result.turns),
+        "notices": [n.to_json() for n in result.notices],
     }
 
 
 def read_activity(files: Mapping[str, bytes]) -> ActivityResult:
-    """Read back what `write_activity` wrote.
+    """Read the files of `write_activity`.
 
     Raises
     ------
@@ -145,12 +145,12 @@ def read_activity(files: Mapping[str, bytes]) -> ActivityResult:
         days=tuple(_read_day(d) for d in data["days"]),
         periods=tuple(_read_period(p) for p in data["periods"]),
         inclination_deg=floats_of(inclination, "inclination_deg"),
-        notices=tuple(Notice(**n) for n in data["notices"]),
+        notices=tuple(Notice.from_json(n) for n in data["notices"]),
     )
 
 
-def _transitions_csv(found: ActivityResult) -> bytes:
-    """Those that count and those that do not, told apart by `status`."""
+def _transitions_csv(result: ActivityResult) -> bytes:
+    """Transitions and rejected candidates, distinguished by `status`."""
     rows: list[tuple[object, ...]] = [
         (
             t.time_s,
@@ -161,10 +161,10 @@ def _transitions_csv(found: ActivityResult) -> bytes:
             t.rise_m,
             "found" if t.consistent else "inconsistent",
         )
-        for t in found.transitions
+        for t in result.transitions
     ]
     rows += [
-        (c.time_s, c.start_s, c.end_s, c.likely, c.lean_deg, c.rise_m, c.refused) for c in found.candidates
+        (c.time_s, c.start_s, c.end_s, c.likely, c.lean_deg, c.rise_m, c.refused) for c in result.candidates
     ]
     rows.sort(key=lambda row: cast("float", row[0]))
     return write_csv(("time_s", "start_s", "end_s", "kind", "lean_deg", "rise_m", "status"), rows)
@@ -196,9 +196,9 @@ def _one_column(name: str, values: np.ndarray) -> bytes:
 
 
 def _plain(value: object) -> dict[str, Any]:
-    found = reduce_to_plain(dict(vars(value)))
-    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
-    return found
+    plain = reduce_to_plain(dict(vars(value)))
+    assert isinstance(plain, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
+    return plain
 
 
 def _read_day(row: dict[str, Any]) -> ActivityDay:

@@ -1,4 +1,4 @@
-"""What analysis.json says of an analysis: quality, devices, calibration, parameters, notices, provenance."""
+"""Content of analysis.json: quality, devices, calibration, parameters, notices, provenance."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def summarise_analysis(analysis: TakeAnalysis) -> dict[str, object]:
 
 
 def _functional(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """Start, end and segments of a functional test; None of any other take."""
+    """Start, end and segments of a functional test; None for other trials."""
     test = analysis.functional
     if test is None:
         return None
@@ -65,19 +65,19 @@ def _functional(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _quality(analysis: TakeAnalysis) -> dict[str, object]:
-    """The quality report; its level is the worse of signals and estimator, `signals_level` the signals'."""
-    found = reduce_to_plain(analysis.quality.to_json())
-    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
+    """The quality report; `level` is the worse of signals and estimator, `signals_level` the former."""
+    report = reduce_to_plain(analysis.quality.to_json())
+    assert isinstance(report, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
     verdict = None if analysis.poses is None else find_worst_verdict(analysis.poses.health)
     level = find_shown_level(analysis.quality.level, verdict)
     bad = [] if analysis.poses is None else [f.name for f in analysis.poses.health if f.verdict == "bad"]
-    judged = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
-    reasons = [*analysis.quality.reasons, *([] if judged is None else [judged])]
-    return {**found, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
+    judgement = PATH_JUDGED if concern_paths_alone(bad) else JUDGED.get(verdict)
+    reasons = [*analysis.quality.reasons, *([] if judgement is None else [judgement])]
+    return {**report, "level": level, "signals_level": analysis.quality.level, "reasons": reasons}
 
 
 def _devices(analysis: TakeAnalysis) -> list[dict[str, object]]:
-    """What each worn device showed of itself, in SI units, and where the analysis took it to be."""
+    """Checks of each sensor, in SI units, and the segment assigned by the analysis."""
     if analysis.uniform is None:
         return []
     agreed = analysis.agreed
@@ -96,7 +96,9 @@ CLOCK_DOUBTS: Final = ("feet_out_of_time", "clocks_disagree")
 
 
 def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """What was found of the clock and the place of every sensor, and of whom nothing could be found."""
+    """Consistency checks of every sensor's clock and placement, including sensors that could not be
+    checked.
+    """
     agreed = analysis.agreed
     if agreed is None:
         return None
@@ -126,10 +128,10 @@ def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
-    """Scores and mean curves, so that a trend over many visits and a group of controls read no angles.
+    """Scores and mean curves, so that trends over many visits and control groups need not read angles.
 
-    Profiles and indices are over several curves. Mean curves are side → variable → 101 degrees from standing,
-    with the decimals of angles.parquet's single precision. One curve is held at a time.
+    Profiles and indices cover several curves. Mean curves are side → variable → 101 degrees relative to
+    standing, with the precision of angles.parquet. Curves are processed one at a time to limit memory.
     """
     angles, measured = analysis.angles, analysis.measured
     if angles is None or measured is None:
@@ -137,28 +139,30 @@ def _summarise_curves(analysis: TakeAnalysis) -> dict[str, object]:
     unsure = list_estimated_variables(_estimator(analysis))
     scored, means = CurveMeans(angles.standing_deg), dict[Side, dict[str, object]]()
 
-    def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
-        curve = replace(known, curves={variable: {side: rows}})
+    def read(cycles: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
+        curve = replace(cycles, curves={variable: {side: rows}})
         scored.add(curve)
-        for of, own in mean_curves(curve, unsure).items():
-            means.setdefault(of, {}).update({v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()})
+        for curve_side, own in mean_curves(curve, unsure).items():
+            means.setdefault(curve_side, {}).update(
+                {v: reduce_to_plain(np.round(c, 5)) for v, c in own.items()}
+            )
 
-    known = read_cycles(angles, measured.strides, read)
-    found = score_curves(known, estimated=unsure, means=scored)
-    return {"scores": score_rows(found), "mean_curves": means}
+    cycles = read_cycles(angles, measured.strides, read)
+    scores = score_curves(cycles, estimated=unsure, means=scored)
+    return {"scores": score_rows(scores), "mean_curves": means}
 
 
-def score_rows(found: Scores) -> list[dict[str, object]]:
-    """Profiles and indices as JSON; what belongs to one curve is left out."""
+def score_rows(score_set: Scores) -> list[dict[str, object]]:
+    """Profiles and indices as JSON, without scores of single curves."""
     return [
         {name: reduce_to_plain(value) for name, value in vars(s).items() if name != "variable"}
-        for s in found.scores
+        for s in score_set.scores
         if s.variable is None
     ]
 
 
 def parameter_row(p: Parameter) -> dict[str, object]:
-    """One parameter as JSON; a number that is not finite is null."""
+    """One parameter as JSON; non-finite numbers become null."""
     return {
         "name": p.name,
         "side": p.side,
@@ -179,17 +183,18 @@ def parameter_row(p: Parameter) -> dict[str, object]:
 
 
 def _body(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """Lengths in m and whether each was measured; None where no body was placed."""
+    """Segment lengths in m and whether each was measured; None if no body was constructed."""
     if analysis.mounted is None:
         return None
     body, subject = analysis.mounted.body, analysis.recording.subject
-    said = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
-    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": said}
+    lengths = {name: {"m": float(getattr(body, name)), "measured": name in body.measured} for name in LENGTHS}
+    return {"height_m": subject.height_m, "leg_m": subject.measures.leg_m, "lengths": lengths}
 
 
 def _sensor_places(analysis: TakeAnalysis) -> object:
-    """Where sensors sit and joints lie, in cm along the segment's axes, beside the nominal places, and the
-    knees' hinges; None where motion was not asked."""
+    """Positions of sensors and joints in cm along the segment's axes, with nominal positions, and the knees'
+    hinge axes; None if not estimated from motion.
+    """
     # readers of results, which have nothing of this to write, do without numba
     from sagittal.core.agreement.joints import LEG_JOINTS
 
@@ -266,13 +271,13 @@ def _calibration(calibration: Calibration | None, angles: JointAngles | None) ->
 
 
 def _score_calibration(analysis: TakeAnalysis) -> object:
-    """Every check of the calibration with its verdict and words; None where it was not reached."""
+    """All checks of the calibration with result and wording; None if it was not reached."""
     score = analysis.calibration_score
     return None if score is None else reduce_to_plain(score.to_json())
 
 
 def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """What contacts are known to, walking bouts with their stops, and turns."""
+    """Uncertainty of contacts, walking bouts with their stops, and turns."""
     measured = analysis.measured
     if measured is None:
         return None
@@ -295,7 +300,7 @@ def _walking(analysis: TakeAnalysis) -> dict[str, object] | None:
 
 
 def _estimator(analysis: TakeAnalysis) -> dict[str, object] | None:
-    """Which pose estimator ran on what, and its health (docs/reference/estimators.md, "Health")."""
+    """The pose estimator, its input, and its health (docs/reference/estimators.md, "Health")."""
     poses = analysis.poses
     if poses is None:
         return None

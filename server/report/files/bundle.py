@@ -1,4 +1,4 @@
-"""Reads the files of a finished analysis back into the objects they were made from."""
+"""Reads the result files of an analysis back into objects."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ ABOUT_FILES: Final = frozenset({"ignored_file", "file_not_read", "file_given_twi
 
 @dataclass(frozen=True)
 class StoredRepetition:
-    """A squat of repetitions.csv; values : measure → number, empty where it does not count."""
+    """A squat of repetitions.csv; values : measure → number, empty if it is excluded."""
 
     side: Side
     start_s: float
@@ -58,14 +58,14 @@ class StoredRepetition:
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """A finished analysis as stored; a part that was not reached is None or empty.
+    """A finished analysis as stored; stages that were not reached are None or empty.
 
     Parameters
     ----------
-    repetitions : of a take of squats, None of any other. functional : of a functional test, as in
-        analysis.json; None of any other. activity : of a take of daily life, None of any other.
+    repetitions : of squats, otherwise None. functional : of a functional test, as in analysis.json, otherwise
+        None. activity : of a daily-life recording, otherwise None.
     quality, calibration, calibration_score, estimator, provenance : the JSON of analysis.json.
-    warnings : its notices but for those that the upload page has told.
+    warnings : its notices, except those already shown on the upload page.
     """
 
     quality: Mapping[str, Any]
@@ -84,7 +84,7 @@ class Bundle:
 
 
 def load_bundle(files: Mapping[str, bytes]) -> Bundle:
-    """Read the files of `analysis_files`; poses are left to `read_poses`, only the replay needs them.
+    """Read the files of `analysis_files`, except poses, which only the replay needs (`read_poses`).
 
     Raises
     ------
@@ -118,24 +118,26 @@ def load_bundle(files: Mapping[str, bytes]) -> Bundle:
 
 def read_repetitions(data: bytes) -> tuple[StoredRepetition, ...]:
     """Squats of repetitions.csv in order of time."""
-    found = []
+    repetitions = []
     for row in csv.DictReader(io.StringIO(data.decode())):
         side, start, end = cast("Side", row.pop("side")), float(row.pop("start_s")), float(row.pop("end_s"))
         excluded = row.pop("excluded_reason") or None
         values = {name: float(x) for name, x in row.items() if name != "bottom_s" and x}
-        found.append(StoredRepetition(side, start, end, values, excluded))
-    return tuple(found)
+        repetitions.append(StoredRepetition(side, start, end, values, excluded))
+    return tuple(repetitions)
 
 
 def read_warnings(data: Mapping[str, Any]) -> tuple[Notice, ...]:
-    """Notices of analysis.json about the take; of files that hold nothing for it the upload page has told."""
-    return keep_told(Notice(**row) for row in data["warnings"])
+    """Notices of analysis.json about the trial, without those about unused files, shown on the upload
+    page.
+    """
+    return keep_told(Notice.from_json(row) for row in data["warnings"])
 
 
 def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
-    """Those that are told of an analysis, one of every fault."""
-    told = {*ABOUT_FILES, "duplicate_stream"}
-    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in told))
+    """Notices to be shown with an analysis, one for each fault."""
+    hidden_codes = {*ABOUT_FILES, "duplicate_stream"}
+    return join_faults(tuple(n for n in notices if n.severity == "error" or n.code not in hidden_codes))
 
 
 FAILURE_CAUSES: Final = ("unequal_lengths", "channel_stuck", "gap")
@@ -146,7 +148,7 @@ FAILURE_EFFECTS: Final = ("foot_missing", "figure_incomplete")
 
 
 def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
-    """Join what is said of one failed sensor into one notice: why it failed, then what follows."""
+    """Merge the notices about one failed sensor into one: the cause of the failure, then its consequences."""
     failed = {n.sensor for n in notices if n.code == "sensor_failed"}
     causes: dict[str | None, Notice] = {}
     for code in FAILURE_CAUSES:
@@ -165,7 +167,7 @@ def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
 
 
 def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) -> Bundle:
-    """The same analysis with what a person's edits give, and a notice that says so."""
+    """Apply the result of a user's edits to an analysis, and add a notice about them."""
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(
         "edited",
@@ -187,25 +189,25 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
 
 
 def is_functional(name: str) -> bool:
-    """Is a parameter one of a functional test?"""
+    """Whether a parameter belongs to a functional test."""
     entry = CATALOGUE.get(name)
     return entry is not None and entry.group in FUNCTIONAL
 
 
 def read_angles(data: bytes) -> JointAngles:
-    """Joint angles of angles.parquet in rad; null becomes NaN again."""
+    """Joint angles of angles.parquet in rad; null becomes NaN."""
     table, meta = read_table(data)
-    found = {
+    angles_rad = {
         name.removesuffix("_deg"): np.radians(floats_of(table, name))
         for name in table.column_names
         if name != "t_s"
     }
-    headings = {name: found.pop(name) for name in tuple(found) if name.endswith("_heading")}
+    headings = {name: angles_rad.pop(name) for name in tuple(angles_rad) if name.endswith("_heading")}
     zero = {name: math.radians(offset) for name, offset in meta["zero_offset_deg"].items()}
     standing = dict(meta.get("standing_angles_deg", {}))
     return JointAngles(
         floats_of(table, "t_s"),
-        found,
+        angles_rad,
         zero,
         meta["angle_zero"],
         diagnostics={"estimated": tuple(meta.get("estimated", ()))},
@@ -237,7 +239,7 @@ def read_poses(data: bytes) -> Poses:
 
 
 def read_events(data: bytes) -> GaitEvents:
-    """Contacts of events.csv; the time of detection is not stored, so it is the event time."""
+    """Contacts of events.csv; the detection time is not stored and is set to the event time."""
     return GaitEvents(
         tuple(
             GaitEvent(
@@ -255,7 +257,7 @@ def read_events(data: bytes) -> GaitEvents:
 
 
 def read_strides(data: bytes) -> Strides:
-    """The stride list of strides.csv; the parameter columns are derived and not read."""
+    """Strides of strides.csv, without the derived parameter columns."""
     return Strides(
         tuple(
             Stride(
@@ -275,10 +277,10 @@ def read_strides(data: bytes) -> Strides:
 
 
 def read_columns(data: bytes) -> dict[str, Column]:
-    """The parameters of strides.csv by name, one entry per stride."""
+    """Parameters of strides.csv by name, one value per stride."""
     rows = list(_rows(data))
-    known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
-    names = [name for name in (rows[0] if rows else ()) if name not in known]
+    columns_known = {*STRIDE_COLUMNS, "flags", "excluded_reason"}
+    names = [name for name in (rows[0] if rows else ()) if name not in columns_known]
     return {name: tuple(_number(row[name]) for row in rows) for name in names}
 
 

@@ -1,4 +1,4 @@
-"""Columns over time as Parquet, and what JSON knows: how every result file is written and read."""
+"""Low-level reading and writing of result files: Parquet columns over time, JSON and CSV."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ PLAIN: Final = frozenset({str, int, bool, type(None)})
 
 
 def reduce_to_plain(value: object) -> object:
-    """Reduce records, mappings, sequences and numpy values to JSON; non-finite numbers become null.
+    """Convert records, mappings, sequences and numpy values to JSON types; non-finite numbers become null.
 
-    A record (dataclass) becomes an object with its fields in their order.
+    A record (dataclass) becomes an object with its fields in order.
     """
     kind = type(value)
     if kind is float:
@@ -58,7 +58,7 @@ def reduce_to_plain(value: object) -> object:
 
 
 def list_turns(turns: Iterable[Turn]) -> list[dict[str, object]]:
-    """Turns as analysis.json and activity.json name them: s, degrees, degrees/s."""
+    """Turns as in analysis.json and activity.json: s, degrees, degrees/s."""
     return [
         {
             "start_s": t.start_s,
@@ -73,10 +73,10 @@ def list_turns(turns: Iterable[Turn]) -> list[dict[str, object]]:
 
 
 def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
-    """A column with every word so many times, each word stored once."""
-    known = list(dict.fromkeys(words))
-    places = np.repeat(np.array([known.index(word) for word in words], np.int16), times)
-    return pa.DictionaryArray.from_arrays(places, pa.array(known, pa.string()))
+    """A dictionary-encoded column with each word repeated a given number of times."""
+    distinct = list(dict.fromkeys(words))
+    places = np.repeat(np.array([distinct.index(word) for word in words], np.int16), times)
+    return pa.DictionaryArray.from_arrays(places, pa.array(distinct, pa.string()))
 
 
 ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
@@ -92,16 +92,16 @@ def parquet_file(
     meta: Mapping[str, object],
     written: Callable[[], None] = lambda: None,
 ) -> bytes:
-    """Columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null.
+    """Write columns over time as Parquet with `meta` as JSON under "sagittal"; NaN becomes null.
 
     Parameters
     ----------
-    written : called after each group of rows.
+    written : called after each row group.
     """
-    kept = {"sagittal": json.dumps(reduce_to_plain(meta))}
+    metadata = {"sagittal": json.dumps(reduce_to_plain(meta))}
     sink, writer = io.BytesIO(), None
     for first in range(0, max(1, len(t_s)), GROUP):
-        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(kept)
+        table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(metadata)
         if writer is None:
             # neighbouring samples share their high bytes: splitting the bytes halves the file
             split = [f.name for f in table.schema if pa.types.is_floating(f.type)]
@@ -119,7 +119,7 @@ def parquet_file(
 
 
 def single_precision(values: Floats, column: int) -> Callable[[slice], np.ndarray]:
-    """A column of (n, k) as `parquet_file` takes it, float32."""
+    """A float32 column of (n, k) for `parquet_file`."""
     return lambda rows: values[rows, column].astype(np.float32)
 
 
@@ -132,14 +132,14 @@ def _lay_out(t_s: Floats, columns: Mapping[str, ParquetColumn], rows: slice) -> 
 
 
 def _as_arrow(part: np.ndarray) -> pa.Array[Any]:
-    """A column; NaN is looked for here, since Arrow takes twenty times as long where there is none."""
+    """Convert a column; NaN is detected here, as Arrow is twenty times slower if there is none."""
     is_whole = part.dtype.kind == "f" and not np.isnan(part).any()
     column: pa.Array[Any] = pa.array(part, from_pandas=not is_whole)
     return column
 
 
 def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
-    """A Parquet file of ours and what `parquet_file` wrote beside its columns."""
+    """Read a Parquet file of ours with the metadata written by `parquet_file`."""
     # a file of ours is small: threads cost more than they read, and `pq.read_table` brings in all of
     # pyarrow.dataset
     table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
@@ -154,19 +154,20 @@ def floats_of(table: pa.Table, name: str) -> Floats:
 
 
 def bools_of(table: pa.Table, name: str) -> Bools:
-    """A column of truth values."""
+    """A column of booleans."""
     return np.asarray(table.column(name).to_numpy(zero_copy_only=False), dtype=np.bool_)
 
 
 def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
-    """UTF-8 comma-separated text with a header; None and non-finite numbers are empty, numbers to 1e-6.
+    """UTF-8 CSV with a header; None and non-finite numbers are empty, others rounded to 1e-6.
 
-    Text that a spreadsheet would take for a formula gets an apostrophe before it (OWASP, "CSV injection").
+    Text that a spreadsheet could interpret as a formula is prefixed with an apostrophe (OWASP, "CSV
+    injection").
     """
-    text, rest = io.StringIO(), iter(rows)
+    text, remaining = io.StringIO(), iter(rows)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(header)
-    while some := list(islice(rest, LINES)):
+    while some := list(islice(remaining, LINES)):
         # column by column: most are numbers, which are rounded together
         columns = [_cells(column) for column in zip(*some, strict=True)]
         writer.writerows(zip(*columns, strict=True))
@@ -188,7 +189,7 @@ LARGE: Final = 1e6
 
 
 def _cells(column: Sequence[object]) -> list[object]:
-    """What stands in a column; a number as Python's `round` has it."""
+    """Format the cells of a column; numbers are rounded like Python's `round`."""
     kinds = set(map(type, column))
     if kinds <= WORDS:
         written = {word: _cell(word) for word in set(column)}
@@ -217,18 +218,18 @@ def _cell(value: object) -> object:
 
 
 def write_json(value: object) -> bytes:
-    """What `json.dumps` writes with an indent of 1, most of it by its compiled part, which knows no indent.
+    """Equivalent of `json.dumps` with an indent of 1, using its faster compiled part where possible.
 
     Raises
     ------
     ValueError
-        a number is not finite, or a key no text.
+        a number is not finite, or a key is not a string.
     """
     return _write_node(value, "\n").encode()
 
 
 def _write_node(value: object, line: str) -> str:
-    """A value as JSON; `line` ends a line and begins one that stands as far in as the value does."""
+    """Format a value as JSON; `line` is a line break with the indentation of the value."""
     inner = f"{line} "
     if not value or not isinstance(value, (dict, list, tuple)):
         return _encoder(inner).encode(value)
@@ -249,5 +250,5 @@ PLAIN_NUMBERS: Final = PLAIN | {float}
 
 @cache
 def _encoder(line: str) -> json.JSONEncoder:
-    """Writes a list or mapping of plain values, `line` between two of them."""
+    """Encoder for a list or mapping of plain values, separated by `line`."""
     return json.JSONEncoder(ensure_ascii=False, allow_nan=False, separators=(f",{line}", ": "))

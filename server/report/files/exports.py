@@ -1,17 +1,17 @@
-"""The files an analysis yields, the same for the command line, the worker and the downloads page.
+"""Result files of an analysis, for command line, worker and downloads page.
 
 analysis.json   quality, devices, calibration, parameters … (server/report/files/analysis_json.py)
 angles.parquet  joint angles in degrees on the uniform axis
 poses.parquet   segment poses for the replay
-tracks.parquet  what strides and parameters are measured on (server/report/files/tracks.py)
-signals.parquet what the sensors measured, on the common time axis (server/report/files/signals.py)
-events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (share of detectors),
+tracks.parquet  input for strides and parameters (server/report/files/tracks.py)
+signals.parquet sensor signals on the common time axis (server/report/files/signals.py)
+events.csv      contacts: time_s, side, kind (ic | tc), source, confidence (fraction of detectors),
                 uncertainty_s (standard)
-steps.csv       steps of a trunk sensor, where no foot carries one: time_s, side
-activity…        of daily life, in place of all but the first (server/report/files/activity_files.py)
-repetitions.csv squats of each leg with their measures and why one was left out, of takes of squats
-strides.csv     one row per stride with its temporal parameters and why it was left out
-repaired.json   the manifest that is proposed where the set-up is wrong (server/results/analysing.py)
+steps.csv       steps of a trunk sensor, if there are no foot sensors: time_s, side
+activity…        of daily life, replacing all but the first (server/report/files/activity_files.py)
+repetitions.csv squats of each leg with their measures and reasons for exclusion
+strides.csv     one row per stride with its temporal parameters and reason for exclusion
+repaired.json   proposed manifest after a setup error (server/results/analysing.py)
 
 Undefined is an empty cell or null, never NaN. `sagittal.server.report.files.bundle` reads them back.
 """
@@ -67,11 +67,11 @@ STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite
 
 
 def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: None) -> dict[str, bytes]:
-    """Write an analysis as files, name → bytes; a stage that gave nothing leaves its file out.
+    """Write an analysis as files, name → bytes; stages without results have no file.
 
     Parameters
     ----------
-    let_go : called when something large is no longer held.
+    let_go : called when a large object has been released.
     """
     if analysis.source.protocol == "activity":
         written = {} if analysis.activity is None else write_activity(analysis.activity)
@@ -157,28 +157,28 @@ def events_csv(events: GaitEvents) -> bytes:
 
 
 def steps_csv(steps: Steps) -> bytes:
-    """Steps of a trunk sensor in order of time; the side is empty where it cannot be told."""
+    """Steps of a trunk sensor in order of time; the side is empty if unknown."""
     return write_csv(("time_s", "side"), ((s.time_s, s.side) for s in steps.steps))
 
 
 def repetitions_csv(squats: Sequence[SquatSide]) -> bytes:
-    """Every squat of every leg in order of time, counted or not; measures of those that count."""
+    """All squats of both legs in order of time, with the measures of the included ones."""
     rows: list[tuple[object, ...]] = []
     for leg in squats:
-        counted = iter(zip(*(leg.values[name].tolist() for name in leg.values), strict=True))
+        included = iter(zip(*(leg.values[name].tolist() for name in leg.values), strict=True))
         for r in leg.repetitions:
-            measured = next(counted) if r.excluded is None else ("",) * len(MEASURES)
+            measured = next(included) if r.excluded is None else ("",) * len(MEASURES)
             rows.append((r.side, r.start_s, r.bottom_s, r.end_s, *measured, r.excluded or ""))
     rows.sort(key=lambda row: row[1:2])
     return write_csv(("side", "start_s", "bottom_s", "end_s", *MEASURES, "excluded_reason"), rows)
 
 
 def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
-    """Every stride, used or not, with its own parameters and the rules that it meets.
+    """All strides with their parameters and exclusion rules that apply.
 
     Parameters
     ----------
-    columns : parameters by name, one entry per stride.
+    columns : parameters by name, one value per stride.
     """
     own = (
         (
@@ -192,7 +192,7 @@ def strides_csv(strides: Strides, columns: Mapping[str, Column]) -> bytes:
         )
         for s in strides.strides
     )
-    why = ((" ".join(s.flags), s.excluded_reason) for s in strides.strides)
+    reasons = ((" ".join(s.flags), s.excluded_reason) for s in strides.strides)
     measured = zip(*columns.values(), strict=True) if columns else repeat(())
-    lines = ((*o, *m, *w) for o, m, w in zip(own, measured, why, strict=False))
+    lines = ((*o, *m, *w) for o, m, w in zip(own, measured, reasons, strict=False))
     return write_csv((*STRIDE_COLUMNS, *columns, "flags", "excluded_reason"), lines)

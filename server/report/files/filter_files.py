@@ -1,4 +1,4 @@
-"""The files that a comparison of filters yields, the same for the page and the downloads.
+"""Result files of a filter comparison, for page and downloads.
 
 filters.json       everything: filters, spread over time and cycle, reference, provenance (schema 1)
 filters.csv        one row per filter: cost and agreement
@@ -45,33 +45,37 @@ MOST_ROWS: Final = 1_000_000
 SCORES: Final = ("total", "heading", "inclination")
 
 
-def filter_run_files(found: FilterComparison) -> dict[str, bytes]:
+def filter_run_files(comparison: FilterComparison) -> dict[str, bytes]:
     """File name → content, angles in degrees."""
-    t_s = bin_values(found.t_s, np.nanmean)
-    made = {
-        "filters.json": _json(found, t_s),
-        "filters.csv": _filters_csv(found.filters),
-        "spread.csv": _spread_csv(found.spreads),
-        "spread_cycle.csv": _cycle_csv(found.spreads),
-        "spread_time.csv": _time_csv(found.spreads, t_s),
-        "orientations.parquet": orientations_parquet(found),
+    t_s = bin_values(comparison.t_s, np.nanmean)
+    files = {
+        "filters.json": _json(comparison, t_s),
+        "filters.csv": _filters_csv(comparison.filters),
+        "spread.csv": _spread_csv(comparison.spreads),
+        "spread_cycle.csv": _cycle_csv(comparison.spreads),
+        "spread_time.csv": _time_csv(comparison.spreads, t_s),
+        "orientations.parquet": orientations_parquet(comparison),
     }
-    if found.reference is not None:
-        made["reference.csv"] = _reference_csv(found, found.reference)
-    return made
+    if comparison.reference is not None:
+        files["reference.csv"] = _reference_csv(comparison, comparison.reference)
+    return files
 
 
-def orientations_parquet(found: FilterComparison, most_rows: int = MOST_ROWS) -> bytes:
-    """Orientations as Parquet: `t_s` (float64), `segment`, `filter`, `qw` … `qz` (float32), null where lost.
+def orientations_parquet(comparison: FilterComparison, most_rows: int = MOST_ROWS) -> bytes:
+    """Orientations as Parquet: `t_s` (float64), `segment`, `filter`, `qw` … `qz` (float32), null if lost.
 
-    `sample_step` beside the columns says which samples are in the file: all (1), every second (2) …
+    The metadata entry `sample_step` gives the decimation: all samples (1), every second (2) …
     """
-    parts = [(f.label, s, q) for f in found.filters for s, q in found.orientations.get(f.name, {}).items()]
-    step = max(1, -(-len(found.t_s) * len(parts) // most_rows))
-    t_s = found.t_s[::step]
+    parts = [
+        (f.label, s, q)
+        for f in comparison.filters
+        for s, q in comparison.orientations.get(f.name, {}).items()
+    ]
+    step = max(1, -(-len(comparison.t_s) * len(parts) // most_rows))
+    t_s = comparison.t_s[::step]
     q = np.empty((len(parts), len(t_s), 4), np.float32)
-    for k, (_, s, of) in enumerate(parts):
-        q[k] = np.where(found.valid[s][::step, None], of[::step], np.nan)
+    for k, (_, s, orientation) in enumerate(parts):
+        q[k] = np.where(comparison.valid[s][::step, None], orientation[::step], np.nan)
     columns: dict[str, np.ndarray | pa.Array[Any]] = {
         "segment": repeat_words([s for _, s, _ in parts], len(t_s)),
         "filter": repeat_words([name for name, _, _ in parts], len(t_s)),
@@ -81,12 +85,12 @@ def orientations_parquet(found: FilterComparison, most_rows: int = MOST_ROWS) ->
 
 
 def bin_values(values: Floats, reduce: Any) -> Floats:
-    """At most BINS values, each of one stretch (m,) by a function that leaves NaN out; NaN where all are."""
+    """Reduce values to at most BINS bins with a function that ignores NaN; NaN where all values are."""
     size = -(-len(values) // BINS)
     padded = np.pad(values, (0, -len(values) % size), constant_values=np.nan).reshape(-1, size)
     out = np.full(len(padded), np.nan)
-    known = np.isfinite(padded).any(axis=1)
-    out[known] = reduce(padded[known], axis=1)
+    finite = np.isfinite(padded).any(axis=1)
+    out[finite] = reduce(padded[finite], axis=1)
     return out
 
 
@@ -94,17 +98,17 @@ def _rms(values: Floats, axis: int) -> Floats:
     return np.asarray(np.sqrt(np.nanmean(values**2, axis=axis)))
 
 
-def _json(found: FilterComparison, t_s: Floats) -> bytes:
+def _json(comparison: FilterComparison, t_s: Floats) -> bytes:
     content = {
         "schema": SCHEMA,
-        "filters": [_row(f) for f in found.filters],
-        "magnetometer": found.request.magnetometer,
-        "segments": found.segments,
-        "strides": found.strides,
+        "filters": [_row(f) for f in comparison.filters],
+        "magnetometer": comparison.request.magnetometer,
+        "segments": comparison.segments,
+        "strides": comparison.strides,
         "t_s": np.round(t_s, 3),
-        "spreads": [_spread(s) for s in found.spreads],
-        "reference": None if found.reference is None else _reference(found.reference),
-        "notices": [n.to_json() for n in found.notices],
+        "spreads": [_spread(s) for s in comparison.spreads],
+        "reference": None if comparison.reference is None else _reference(comparison.reference),
+        "notices": [n.to_json() for n in comparison.notices],
     }
     return json.dumps(reduce_to_plain(content), ensure_ascii=False, allow_nan=False).encode()
 
@@ -125,7 +129,7 @@ def _row(f: FilterAgreement) -> dict[str, object]:
 
 
 def _score(score: OrientationScore | None) -> dict[str, float] | None:
-    """Degrees; None stays None."""
+    """Convert to degrees; None remains None."""
     return None if score is None else {name: _deg(getattr(score, name)) for name in SCORES}
 
 
@@ -179,14 +183,14 @@ def _reference(r: ReferenceScores) -> dict[str, object]:
 
 def _filters_csv(filters: Sequence[FilterAgreement]) -> bytes:
     header = ["filter", "engine", "grade", "cost_us_per_sample"]
-    header += [f"{name}_to_{what}_deg" for what in ("median", "own") for name in SCORES]
+    header += [f"{name}_to_{reference_name}_deg" for reference_name in ("median", "own") for name in SCORES]
     rows = []
     for f in filters:
         row = _row(f)
         scores = [x or {} for x in (_score(f.to_median), _score(f.to_own))]
-        told = " ".join(f"{n.sensor}: {n.message}" if n.sensor else n.message for n in f.told)
+        problems = " ".join(f"{n.sensor}: {n.message}" if n.sensor else n.message for n in f.told)
         values = [score.get(name) for score in scores for name in SCORES]
-        rows.append((f.label, row["engine"], row["grade"], f.cost_us, *values, told))
+        rows.append((f.label, row["engine"], row["grade"], f.cost_us, *values, problems))
     return write_csv([*header, "told"], rows)
 
 
@@ -217,17 +221,17 @@ def _cycle_csv(spreads: Sequence[FilterSpread]) -> bytes:
 
 def _time_csv(spreads: Sequence[FilterSpread], t_s: Floats) -> bytes:
     columns = {
-        f"{s.name}_{what}_deg": _degs(bin_values(values, reduce))
+        f"{s.name}_{statistic}_deg": _degs(bin_values(values, reduce))
         for s in spreads
-        for what, values, reduce in (("sd", s.sd, _rms), ("range", s.range, np.nanmax))
+        for statistic, values, reduce in (("sd", s.sd, _rms), ("range", s.range, np.nanmax))
     }
     rows = ((t, *(c[i] for c in columns.values())) for i, t in enumerate(t_s))
     return write_csv(["t_s", *columns], rows)
 
 
-def _reference_csv(found: FilterComparison, r: ReferenceScores) -> bytes:
-    """RMSE of whole orientations has no bias; that of angles has bias and limits."""
-    label = {f.name: f.label for f in found.filters}
+def _reference_csv(comparison: FilterComparison, r: ReferenceScores) -> bytes:
+    """Agreement with the reference: RMSE for orientations; bias and limits as well for angles."""
+    label = {f.name: f.label for f in comparison.filters}
 
     def rows() -> Iterator[Sequence[object]]:
         for name, by_segment in r.scores.items():

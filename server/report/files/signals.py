@@ -1,4 +1,4 @@
-"""signals.parquet: what every sensor measured, on the common time axis, in the sensor's own axes.
+"""signals.parquet: sensor signals on the common time axis, in sensor axes.
 
 `<segment>_acc_x…z` (m/s²), `<segment>_gyr_x…z_dps`; a lost sample is null.
 """
@@ -16,7 +16,7 @@ NAME = "signals.parquet"
 
 
 def signals_parquet(recording: UniformRecording) -> bytes:
-    """Write the signals as they entered calibration: nothing filtered, nothing turned."""
+    """Write the signals as input to calibration, neither filtered nor rotated."""
     columns: dict[str, ParquetColumn] = {}
     for segment, s in recording.sensors.items():
         columns |= {f"{segment}_acc_{c}": partial(_force, s, i) for i, c in enumerate("xyz")}

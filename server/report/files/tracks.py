@@ -1,8 +1,8 @@
-"""tracks.parquet: what strides and parameters are measured on, kept so that an edit can be measured again.
+"""tracks.parquet: input for strides and parameters, stored so that they can be recomputed after an edit.
 
 Feet: `<foot>_q_w…z`, `<foot>_valid`; their paths `<foot>_path_x…z` (m), `<foot>_path_q_w…z` where it differs,
 `<foot>_path_valid`, `<foot>_still`, `<foot>_patched`; `<pelvis|chest>_acc_x…z` in the walking frame (m/s²);
-`turning`. Angles and events lie in their own files.
+`turning`. Angles and events have separate files.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ _Made = TypeVar("_Made")
 
 
 def tracks_parquet(tracks: Tracks) -> bytes:
-    """Write what `core.parameters.measure.measure_gait` needs beside angles.parquet and events.csv."""
+    """Write the input of `core.parameters.measure.measure_gait` other than angles and events."""
     columns: dict[str, ParquetColumn] = {}
     for segment, q in tracks.q.items():
         columns |= _spread(f"{segment}_q", q, "wxyz")
@@ -88,23 +88,23 @@ def tracks_parquet(tracks: Tracks) -> bytes:
 
 
 def _are_equal(a: Floats, b: Floats) -> bool:
-    """Whether two arrays (n, k) are, without reading further than they are."""
+    """Whether two arrays (n, k) are equal, stopping at the first difference."""
     return a is b or all(np.array_equal(a[part], b[part]) for part in cut_blocks(len(a)))
 
 
 def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> Tracks:
-    """Read tracks.parquet; events as detected and angles come from their own files."""
+    """Read tracks.parquet; detected events and angles come from their own files."""
     table, meta = read_table(data)
-    worn: list[Segment] = [s for s in SEGMENTS if f"{s}_valid" in table.column_names]
+    segments: list[Segment] = [s for s in SEGMENTS if f"{s}_valid" in table.column_names]
     trunk: list[Segment] = [s for s in SEGMENTS if f"{s}_acc_x" in table.column_names]
-    q = {s: _gathered(table, f"{s}_q", "wxyz") for s in worn}
+    q = {s: _gathered(table, f"{s}_q", "wxyz") for s in segments}
     rate = float(meta["rate_hz"])
     return Tracks(
         t_s=floats_of(table, "t_s"),
         rate_hz=rate,
         events=events,
         q=q,
-        valid={s: bools_of(table, f"{s}_valid") for s in worn},
+        valid={s: bools_of(table, f"{s}_valid") for s in segments},
         turning=bools_of(table, "turning") if "turning" in table.column_names else None,
         feet=_feet(table, meta["feet"], rate, q),
         angles=angles,
@@ -120,7 +120,7 @@ def read_tracks(data: bytes, events: GaitEvents, angles: JointAngles | None) -> 
 
 
 def _steps_meta(steps: Steps) -> dict[str, object]:
-    """Steps of a trunk sensor as JSON; their notices lie with all others in analysis.json."""
+    """Steps of a trunk sensor as JSON; their notices are in analysis.json."""
     return {
         "source": steps.source,
         "steps": [(s.time_s, s.side) for s in steps.steps],
@@ -170,7 +170,7 @@ def _feet(
 
 
 def _made(kind: type[_Made], values: Mapping[str, Any]) -> _Made:
-    """A dataclass from stored values; a later version may have more members, they take their defaults."""
+    """Create a dataclass from stored values; fields missing in older files take their defaults."""
     names = {f.name for f in dataclasses.fields(kind)}  # type: ignore[arg-type] # every kind here is a dataclass
     return kind(**{k: v for k, v in values.items() if k in names})
 

@@ -1,1 +1,1 @@
-"""Figures over the visits of a person: trends, comparisons, the leaflet."""
+"""Parameters over a patient's visits: trends, comparisons, and the leaflet."""

@@ -1,4 +1,4 @@
-"""Two sessions of a person side by side: every figure before and after, the change and its verdict."""
+"""Comparison of two sessions of a patient: all parameters before and after, changes and their assessment."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ NormsOfTwo = tuple[Norms, Norms]
 
 @dataclass(frozen=True)
 class ComparedRow:
-    """A figure of one side, or of the whole take.
+    """A parameter of one side or of the whole trial.
 
     Parameters
     ----------
-    before, after : as printed, "–" where not measured. reason : why there is no number after, else None.
+    before, after : as printed, "–" if not measured. reason : why the later value is missing, otherwise None.
     """
 
     title: str
@@ -48,39 +48,39 @@ class ComparedRow:
 
 
 def compare_figures(
-    before: Numbers, after: Numbers, norms: NormsOfTwo | None = None, affected: Side | None = None
+    earlier: Numbers, later: Numbers, norms: NormsOfTwo | None = None, affected: Side | None = None
 ) -> tuple[Change, ...]:
-    """What changed of every figure that either session has, in the order of the table.
+    """Changes of all parameters present in either session, in table order.
 
     Parameters
     ----------
-    norms : of the earlier and of the later session, each at its own speed; without them changes have no
+    norms : for the earlier and the later session, each at its own speed; without them changes have no
         direction.
     """
-    known = None if norms is None else (norms[0].values, norms[1].values)
-    there = {(p.name, p.side) for n in (before, after) for p in collect_figures(n) if p.mean is not None}
+    norm_values = None if norms is None else (norms[0].values, norms[1].values)
+    keys = {(p.name, p.side) for n in (earlier, later) for p in collect_figures(n) if p.mean is not None}
     order = {name: i for i, name in enumerate((*CATALOGUE, *SCORE_TERMS))}
-    found = [
+    changes = [
         c
-        for c in parameter_changes(collect_figures(before), collect_figures(after), affected, known)
-        if (c.name, c.side) in there
+        for c in parameter_changes(collect_figures(earlier), collect_figures(later), affected, norm_values)
+        if (c.name, c.side) in keys
     ]
-    return tuple(sorted(found, key=lambda c: order.get(c.name, len(order))))
+    return tuple(sorted(changes, key=lambda c: order.get(c.name, len(order))))
 
 
 def compare_rows(
-    before: Numbers,
-    after: Numbers,
+    earlier: Numbers,
+    later: Numbers,
     norms: NormsOfTwo | None = None,
     affected: Side | None = None,
     *,
     comparable: bool = True,
 ) -> tuple[ComparedRow, ...]:
-    """The table of a comparison; without verdicts where the two were not walked alike."""
-    reasons = {(p.name, p.side): p.reason for p in collect_figures(after)}
+    """Table of a comparison; changes are not assessed if the walking conditions differ."""
+    reasons = {(p.name, p.side): p.reason for p in collect_figures(later)}
     rows = []
-    for found in compare_figures(before, after, norms, affected):
-        c = found if comparable else withdraw_verdicts(found)
+    for change in compare_figures(earlier, later, norms, affected):
+        c = change if comparable else withdraw_verdicts(change)
         term = find_term(c.name, c.unit)
         old, new = (
             "–" if value is None else format_number(value, term.digits) for value in (c.before, c.after)
@@ -92,14 +92,14 @@ def compare_rows(
     return tuple(rows)
 
 
-def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group, ...]:
-    """Rows of a session's table with their change since an earlier one, where both have a number.
+def add_changes(groups: Sequence[Group], changes: Sequence[Change]) -> tuple[Group, ...]:
+    """Add changes since an earlier session to the rows of a table, where both have a value.
 
-    Of a number that is not measured alike it says so. A level from the anatomical zero shows the change of
-    the same one from standing, which every visit has.
+    Values with different measurement methods are marked as such. An angle relative to the anatomical zero
+    shows the change relative to standing, which is available at every visit.
     """
     words: dict[str, list[ChangeWords]] = {}
-    for c in found:
+    for c in changes:
         if c.difference is not None or c.reason == NOT_MEASURED_ALIKE:
             words.setdefault(c.name, []).append(change_words(c))
 
@@ -107,14 +107,14 @@ def add_changes(groups: Sequence[Group], found: Sequence[Change]) -> tuple[Group
         measured = from_standing(row.name)
         if measured is None:
             return tuple(words.get(row.name, ()))
-        there = {side for side, cell in (("left", row.left), ("right", row.right)) if cell is not None}
-        return tuple(replace(w, about=STANDING) for w in words.get(measured, ()) if w.side in {None, *there})
+        sides = {side for side, cell in (("left", row.left), ("right", row.right)) if cell is not None}
+        return tuple(replace(w, about=STANDING) for w in words.get(measured, ()) if w.side in {None, *sides})
 
     return tuple((name, tuple(replace(row, change=of(row)) for row in rows)) for name, rows in groups)
 
 
 def comparison_csv(rows: Sequence[ComparedRow]) -> bytes:
-    """One row per figure and side, numbers in full."""
+    """One row per parameter and side, with unrounded numbers."""
     header = (
         *("name", "side", "unit", "before", "after", "change", "verdict", "towards_norm"),
         *("mdc", "mdc_source", "mcid", "mcid_source", "reason"),

@@ -1,7 +1,7 @@
-"""What a person can do in the clinic beside what the person does at home, over the same time.
+"""Capacity in the clinic and performance at home, over the same period.
 
 Capacity is the walk of a clinic session (gait speed, cadence); performance is daily life (steps per day,
-cadence of longer walks). They are not the same thing and have axes of their own; cadence shares one.
+cadence of longer bouts). They are different quantities with separate axes; cadence shares one.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sagittal.core.activity.result import ActivityResult
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 LONG_BOUT_S: Final = 60.0
 """Walks at home whose cadence is compared last at least so long: short ones turn and stop."""
@@ -34,7 +34,7 @@ LABEL_SHARE: Final = 0.13
 
 @dataclass(frozen=True)
 class CapacityVisit:
-    """A walk in the clinic; what it did not measure is None."""
+    """A walk in the clinic; unmeasured values are None."""
 
     session_id: str
     day: dt.date
@@ -49,8 +49,8 @@ class PerformanceDay:
 
     Parameters
     ----------
-    day : of the device's clock, else counted from the day of the session. cadence_spm : median of the walks
-        of LONG_BOUT_S or longer, None without one.
+    day : by the device's clock, otherwise counted from the date of the session.
+    cadence_spm : median of the walking bouts of at least LONG_BOUT_S, None without any.
     """
 
     session_id: str
@@ -61,13 +61,13 @@ class PerformanceDay:
 
     @property
     def counted(self) -> bool:
-        """Worn long enough to be compared."""
+        """Whether wear time is sufficient for comparison."""
         return self.worn_h >= WORN_H
 
 
 @dataclass(frozen=True)
 class TrendPanel:
-    """One chart of the figure."""
+    """One chart."""
 
     title: str
     unit: str
@@ -77,21 +77,23 @@ class TrendPanel:
 def read_capacity(
     session_id: str, day: dt.date, title: str, parameters: Sequence[Parameter]
 ) -> CapacityVisit | None:
-    """What a walk in the clinic says; None where it measured neither speed nor cadence."""
-    by = {p.name: p.mean for p in parameters if p.side is None}
-    speed, cadence = by.get("gait_speed_mps"), by.get("cadence_spm")
+    """Speed and cadence of a clinic walk; None if neither was measured."""
+    means = {p.name: p.mean for p in parameters if p.side is None}
+    speed, cadence = means.get("gait_speed_mps"), means.get("cadence_spm")
     if speed is None and cadence is None:
         return None
     return CapacityVisit(session_id, day, title, speed, cadence)
 
 
-def read_performance(session_id: str, performed_on: dt.date, found: ActivityResult) -> list[PerformanceDay]:
-    """The days of a recording of daily life on which the sensor was worn at all."""
+def read_performance(
+    session_id: str, performed_on: dt.date, activity: ActivityResult
+) -> list[PerformanceDay]:
+    """Days of a daily-life recording with any wear time."""
     days = []
-    for i, d in enumerate(found.days):
+    for i, d in enumerate(activity.days):
         own = [
             b.cadence_spm
-            for b in found.bouts
+            for b in activity.bouts
             if d.start_s <= b.start_s < d.end_s and b.kind == "walking" and b.duration_s >= LONG_BOUT_S
         ]
         if d.worn_h > 0.0:
@@ -104,9 +106,9 @@ def read_performance(session_id: str, performed_on: dt.date, found: ActivityResu
 def draw_daily_trend(
     capacity: Sequence[CapacityVisit], performance: Sequence[PerformanceDay]
 ) -> tuple[TrendPanel, ...]:
-    """Draw capacity and performance over one time axis; empty where nobody recorded daily life.
+    """Draw capacity and performance on one time axis; empty without daily-life recordings.
 
-    Clinic: discs. Home: bars and rings, dashed where the day was not worn long enough.
+    Clinic: discs. Home: bars and rings, dashed if the wear time is insufficient.
     """
     if not performance:
         return ()
@@ -127,8 +129,8 @@ def draw_daily_trend(
     if clinic or home:
         plot = _TimePanel(span, _range([x for _, x in clinic] + [x for _, x, _ in home]))
         plot.add_line(clinic)
-        for day, value, counted in home:
-            plot.add_dot(plot.x(day), value, "ak-ring" if counted else "ak-ring part", 4.0)
+        for day, value, is_counted in home:
+            plot.add_dot(plot.x(day), value, "ak-ring" if is_counted else "ak-ring part", 4.0)
         panels.append(TrendPanel("Cadence: clinic and walks at home", "steps/min", plot.finish("Cadence")))
     return tuple(panels)
 
@@ -151,13 +153,13 @@ class _TimePanel(PlotArea):
             self.add_tick("g", tick, format_number(tick, digits))
 
     def x(self, day: dt.date) -> float:
-        """Place of a day, 0 to 1000."""
+        """Horizontal position of a day, 0 to 1000."""
         if not self._days:
             return 500.0
         return 1000 * (ROOM + (1 - 2 * ROOM) * (day - self._first).days / self._days)
 
     def add_line(self, points: Sequence[tuple[dt.date, float]]) -> None:
-        """Add discs and the line that joins them."""
+        """Add discs and their connecting line."""
         d = "L".join(f"{format_coordinate(self.x(day))} {format_coordinate(self.y(v))}" for day, v in points)
         if len(points) > 1:
             self.add(f'<path class="tr-b" d="M{d}"/>')
@@ -165,12 +167,12 @@ class _TimePanel(PlotArea):
             self.add_dot(self.x(day), value, "pl-b", 5.0)
 
     def add_day_bar(self, day: dt.date, value: float, *, full: bool) -> None:
-        """Add the bar of a day, as wide as the day and never too thin to see."""
+        """Add the bar of a day, with the width of the day but at least visible."""
         wide = max(6.0, 0.7 * 1000 * (1 - 2 * ROOM) / max(self._days, 8))
         self.add_band("bar" if full else "bar part", 0.0, value, self.x(day) - wide / 2, wide)
 
     def finish(self, title: str) -> str:
-        """Write days under the axis and return the chart."""
+        """Add dates below the axis and return the chart."""
         step = max(1, math.ceil(self._days * LABEL_SHARE))
         ends = range(0, self._days + 1, step) if self._days else (0,)
         for days in ends:

@@ -1,4 +1,4 @@
-"""Draws what the takes showed of a sensor over their days, by the rules of the trends (trend_chart.py)."""
+"""Charts of a sensor's checks over time, following the conventions of trends (trend_chart.py)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Final
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 HEIGHT: Final = 168
 """px with margins."""
@@ -24,18 +24,18 @@ def draw_device(
     least: float,
     band: tuple[float, float] | None = None,
 ) -> str | None:
-    """Draw a figure of a sensor over the days of its takes; None where it was never measured.
+    """Draw a quantity of a sensor over the dates of its trials; None if it was never measured.
 
     Parameters
     ----------
-    least : height of the value axis that is not fallen below, so that noise does not look like a change.
-    band : within which a value is no change.
+    least : minimum range of the value axis, so that noise does not look like a change.
+    band : range of values that are not a change.
     """
-    there = [(x, v) for x, v in zip(_places(days), values, strict=True) if v is not None]
-    if not there:
+    plotted_points = [(x, v) for x, v in zip(_places(days), values, strict=True) if v is not None]
+    if not plotted_points:
         return None
-    shown = [*(v for _, v in there), *(band or ())]
-    low, high = min(shown), max(shown)
+    plotted = [*(v for _, v in plotted_points), *(band or ())]
+    low, high = min(plotted), max(plotted)
     room = max(0.08 * (high - low), (least - (high - low)) / 2)
     plot = PlotArea((low - room, high + room), HEIGHT - TOP - BOTTOM)
     if band is not None:
@@ -44,30 +44,32 @@ def draw_device(
     for tick in ticks:
         plot.add_tick("g", tick, format_number(tick, places))
     _name_days(plot, days)
-    points = "L".join(f"{format_coordinate(x)} {format_coordinate(plot.y(v))}" for x, v in there)
+    points = "L".join(f"{format_coordinate(x)} {format_coordinate(plot.y(v))}" for x, v in plotted_points)
     plot.add(f'<path class="tr-b" d="M{points}"/>')
-    for x, v in there[:-1]:
+    for x, v in plotted_points[:-1]:
         plot.add_dot(x, v, "ps-b", 2.8)
-    x, v = there[-1]
+    x, v = plotted_points[-1]
     plot.add_dot(x, v, "pl-b", 5.0)
-    at, text = f"{format_coordinate(x / 10)}%", format_number(v, digits)
-    plot.add_text(at, plot.px(v), text, "strong halo", "middle", dy=-11)
+    x_text, text = f"{format_coordinate(x / 10)}%", format_number(v, digits)
+    plot.add_text(x_text, plot.px(v), text, "strong halo", "middle", dy=-11)
     return plot.draw("chart trend-plot", f"{title} over the takes; the table has the numbers")
 
 
 def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:
-    """Days under the axis, the first and the last before those between."""
-    at = _places(days)
-    taken: list[float] = []
+    """Dates below the axis, giving priority to the first and last."""
+    positions = _places(days)
+    placed: list[float] = []
     for i in (0, len(days) - 1, *range(1, len(days) - 1)):
-        if all(abs(at[i] - other) * WIDTH_PX / 1000 >= LABEL_PX for other in taken):
-            taken.append(at[i])
+        if all(abs(positions[i] - position) * WIDTH_PX / 1000 >= LABEL_PX for position in placed):
+            placed.append(positions[i])
             label = f"{days[i].day} {MONTHS[days[i].month - 1]}"
-            plot.add_text(f"{format_coordinate(at[i] / 10)}%", plot.height, label, "words", "middle", dy=15)
+            plot.add_text(
+                f"{format_coordinate(positions[i] / 10)}%", plot.height, label, "words", "middle", dy=15
+            )
 
 
 def _places(days: Sequence[dt.date]) -> list[float]:
-    """Where takes stand on the axis, 0 to 1000; takes of one day lie beside each other."""
+    """Positions of trials on the axis, 0 to 1000; trials of one day are placed side by side."""
     span = (days[-1] - days[0]).days
     if span == 0:
         n = len(days)

@@ -1,4 +1,4 @@
-"""What the patient takes home: two or three figures in plain words, beside those of the last time."""
+"""Leaflet for patients: two or three parameters in plain language, with previous values."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from sagittal.server.report.words.wording import format_number
 
 @dataclass(frozen=True)
 class PlainFigure:
-    """How a figure is told to somebody who is not of the field.
+    """Description of a parameter for lay readers.
 
     Parameters
     ----------
-    title : with {side} where it is of a leg. unit, factor, digits : the value in everyday units.
-    up, down : how a real change is called.
+    title : with {side} for a leg. unit, factor, digits : conversion to everyday units.
+    up, down : wording of a real change.
     """
 
     name: str
@@ -56,12 +56,12 @@ REAL: Final = ("real_change", "clinically_relevant")
 
 @dataclass(frozen=True)
 class LeafletFigure:
-    """A figure as the leaflet shows it.
+    """A parameter as shown on the leaflet.
 
     Parameters
     ----------
-    now, before : value with its unit; before None = no number that is compared. words : what became of it.
-    estimated : a model of the leg gives it, and no two sensors measure it.
+    now, before : value with its unit; before None = not compared. words : description of the change.
+    estimated : estimated by a leg model rather than measured by two sensors.
     """
 
     title: str
@@ -74,31 +74,31 @@ class LeafletFigure:
 def list_figures(
     parameters: Sequence[Parameter], changes: Sequence[Change], affected: Side | None
 ) -> tuple[LeafletFigure, ...]:
-    """The figures that were measured; of a leg that of the affected side, else of the smaller value.
+    """Measured parameters; of a leg the affected side, otherwise the smaller value.
 
     Parameters
     ----------
-    changes : since the last time, empty without one that can be compared.
+    changes : since the previous visit, empty if not comparable.
     """
-    found = []
+    figures = []
     for figure in FIGURES:
         mine = {p.side: (p.mean, p) for p in parameters if p.name == figure.name and p.mean is not None}
         if not mine:
             continue
         side = affected if affected in mine else min(mine, key=lambda s: mine[s][0])
-        value, told = mine[side]
+        value, change_text = mine[side]
         change = next((c for c in changes if (c.name, c.side) == (figure.name, side)), None)
-        before = None if change is None or change.difference is None else change.before
-        found.append(
+        previous = None if change is None or change.difference is None else change.before
+        figures.append(
             LeafletFigure(
                 figure.title.format(side=side),
                 _say(figure, value),
-                None if before is None else _say(figure, before),
+                None if previous is None else _say(figure, previous),
                 _judge(figure, change),
-                told.estimated,
+                change_text.estimated,
             )
         )
-    return tuple(found)
+    return tuple(figures)
 
 
 def _say(figure: PlainFigure, value: float) -> str:
@@ -106,7 +106,7 @@ def _say(figure: PlainFigure, value: float) -> str:
 
 
 def _judge(figure: PlainFigure, change: Change | None) -> str:
-    """A change is only named where it is larger than the measurement error."""
+    """Name a change only if it exceeds the measurement error."""
     if change is not None and change.reason == NOT_MEASURED_ALIKE:
         return "It was measured in another way last time, so the two numbers are not compared."
     if change is None or change.difference is None:

@@ -1,4 +1,4 @@
-"""The numbers of a finished analysis without its signals: what a look over many visits reads."""
+"""Results of an analysis without its signals, for summaries over many visits."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from sagittal.server.report.words.estimator import list_estimated_angles, list_e
 
 @dataclass(frozen=True)
 class Numbers:
-    """Parameters, the scores over several curves, and the verdict on the data (its shape and word).
+    """Parameters, scores over several curves, and data quality (symbol and word).
 
     Parameters
     ----------
-    contacts_s : what the contacts are known to, s; None where nothing says so.
+    contacts_s : uncertainty of contacts, s; None if unknown.
     """
 
     parameters: tuple[Parameter, ...]
@@ -39,20 +39,22 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class WalkMeans:
-    """What a control's walk gives to a reference: parameters, and mean curves in degrees from standing."""
+    """Contribution of a control's walk to a reference: parameters, and mean curves relative to
+    standing, deg.
+    """
 
     parameters: tuple[Parameter, ...]
     curves: MeanCurves
 
 
 class _StoredParameters(msgspec.Struct):
-    """What of analysis.json says which parameters there are; all else is passed over."""
+    """Parameter-related content of analysis.json."""
 
     parameters: tuple[Parameter, ...]
     estimator: dict[str, Any] | None = None
 
     def mark(self) -> tuple[Parameter, ...]:
-        """Mark what is estimated: files of earlier versions say so only of the angles."""
+        """Mark estimated parameters, since files of earlier versions mark only angles."""
         return mark_estimated(self.parameters, list_estimated_angles(self.estimator))
 
 
@@ -72,7 +74,7 @@ _read_numbers = msgspec.json.Decoder(_StoredNumbers).decode
 
 
 def read_means(content: bytes) -> WalkMeans | None:
-    """The means in analysis.json; None if it is of a version that wrote no mean curves."""
+    """Means from analysis.json; None if written by a version without mean curves."""
     stored = _read_means(content)
     if stored.mean_curves is None:
         return None
@@ -83,7 +85,7 @@ def read_means(content: bytes) -> WalkMeans | None:
 
 
 def means_of(bundle: Bundle) -> WalkMeans:
-    """The means of an analysis that was read with its curves."""
+    """Means of an analysis that was loaded with its curves."""
     parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
     if bundle.angles is None:
         return WalkMeans(parameters, {})
@@ -92,34 +94,34 @@ def means_of(bundle: Bundle) -> WalkMeans:
 
 
 def read_numbers(content: bytes) -> Numbers | None:
-    """The numbers in analysis.json; None if it is of a version that wrote no scores."""
+    """Results from analysis.json; None if written by a version without scores."""
     stored = _read_numbers(content)
     if stored.scores is None:
         return None
     parameters = stored.mark()
     severities = {n.severity for n in keep_told(stored.warnings)}
-    judged = data_verdict(stored.quality, stored.estimator, severities, parameters)
+    verdict = data_verdict(stored.quality, stored.estimator, severities, parameters)
     contacts_s = (stored.walking or {}).get("contact_uncertainty_s")
-    return Numbers(parameters, tuple(_score(row) for row in stored.scores), judged, contacts_s)
+    return Numbers(parameters, tuple(_score(row) for row in stored.scores), verdict, contacts_s)
 
 
 def numbers_of(bundle: Bundle) -> Numbers:
-    """The numbers of an analysis that was read with its curves."""
+    """Results of an analysis that was loaded with its curves."""
     unsure = list_estimated_variables(bundle.estimator)
     parameters = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
-    judged = data_verdict(
+    verdict = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
     )
     contacts_s = bundle.events.contact_uncertainty_s
     if bundle.angles is None:
-        return Numbers(parameters, (), judged, contacts_s)
+        return Numbers(parameters, (), verdict, contacts_s)
     curves = cycle_curves(bundle.angles, bundle.strides)
-    found = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
-    scores = tuple(s for s in found.scores if s.variable is None)
-    return Numbers(parameters, scores, judged, contacts_s)
+    curve_scores = score_curves(curves, bundle.angles.standing_deg, estimated=unsure)
+    scores = tuple(s for s in curve_scores.scores if s.variable is None)
+    return Numbers(parameters, scores, verdict, contacts_s)
 
 
 def _score(row: Mapping[str, Any]) -> Score:
     healthy = row["healthy"]
-    known = {**row, "healthy": None if healthy is None else ScoreSpread(**healthy)}
-    return Score(variable=None, **{**known, "missing": tuple(row["missing"])})
+    fields = {**row, "healthy": None if healthy is None else ScoreSpread(**healthy)}
+    return Score(variable=None, **{**fields, "missing": tuple(row["missing"])})

@@ -1,4 +1,4 @@
-"""Draws the takes of a visit on one line: a ring per take with its strides' spread, a bar at their mean."""
+"""Chart of the trials of a visit on one line: rings with the spread of their strides, a bar at the mean."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ WIDTH, HEIGHT, ROOM = 92, 24, 6
 
 
 def find_scale(values: Sequence[Parameter]) -> tuple[float, float] | None:
-    """Ends of a scale on which all takes of a person lie with their spreads; None without a value."""
+    """Limits of a scale that includes all trials of a patient with their spread; None without values."""
     lows = [p.mean - (p.sd or 0.0) for p in values if p.mean is not None]
     highs = [p.mean + (p.sd or 0.0) for p in values if p.mean is not None]
     if not lows:
@@ -24,7 +24,7 @@ def find_scale(values: Sequence[Parameter]) -> tuple[float, float] | None:
 
 
 def takes_svg(takes: Sequence[Parameter], mean: Parameter, scale: tuple[float, float], label: str) -> str:
-    """Draw the takes that have a value; `label` says the same in words."""
+    """Draw the trials with a value; `label` is the text alternative."""
     low, high = scale
 
     def x(value: float) -> str:

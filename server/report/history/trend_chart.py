@@ -1,7 +1,7 @@
-"""Draws one line of a trend: assessments large, trainings small, the measurement error as a band.
+"""Chart of one side of a trend: assessments large, trainings small, the measurement error as a band.
 
-The rules are those of the cycle curves (server/report/charts/svg.py): the plot stretches, text and strokes do
-not, colours come from CSS classes.
+Follows the conventions of the cycle curves (server/report/charts/svg.py): the plot stretches, text and
+strokes do not, colours are set by CSS classes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Final
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trends import AnalysedVisit, Trend, TrendSeries
 from sagittal.server.report.words.wording import format_number
-from sagittal.web.language import MONTHS
+from sagittal.web.message_format import MONTHS
 
 TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""
@@ -34,14 +34,14 @@ SMALL_PX: Final = 170
 
 @dataclass(frozen=True)
 class PlannedAssessment:
-    """A planned assessment that is still to come."""
+    """An upcoming planned assessment."""
 
     label: str
     day: dt.date
 
 
 def value_range(trend: Trend) -> tuple[float, float]:
-    """Ends of the value axis, the same for both sides: values, bands and norm with some room."""
+    """Limits of the value axis for both sides: values, bands and norm with a margin."""
     values: list[float] = []
     for line in trend.lines:
         values += [p.value for p in line.points]
@@ -63,12 +63,12 @@ def trend_svg(
     *,
     small: bool = False,
 ) -> str:
-    """Draw one side of a trend over the days of all visits, so that all charts of a person share their axis.
+    """Draw one side of a trend over the dates of all visits, so that all charts of a patient share an axis.
 
     Parameters
     ----------
-    ahead : planned assessments to come, hairlines with their label. height : px with margins.
-    small : beside others: without grid and without words on band and limit.
+    ahead : upcoming planned assessments, drawn as labelled hairlines. height : px including margins.
+    small : for small multiples, without grid and without labels of band and limit.
     """
     plot = _TrendPlot(
         value_range(trend), visits, ahead, height - TOP - BOTTOM, SMALL_PX if small else WIDTH_PX
@@ -101,7 +101,7 @@ def trend_svg(
 
 
 class _TrendPlot(PlotArea):
-    """A plot over the days of visits."""
+    """A plot over the dates of visits."""
 
     def __init__(
         self,
@@ -121,16 +121,16 @@ class _TrendPlot(PlotArea):
         self._alone = span == 0
 
     def days(self) -> None:
-        """Hairlines of what is planned, and what stands under the axis: assessments first, then trainings."""
-        wanted = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
+        """Hairlines of planned visits, and labels below the axis: assessments first, then trainings."""
+        labels = [(v.performed_on, v.label or _day(v.performed_on), "words") for v in self._visits
                   if v.kind == "assessment"]  # fmt: skip
-        wanted += [(a.day, a.label, "") for a in self._ahead]
-        wanted.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
-        taken: list[float] = []
-        for day, label, css in wanted:
+        labels += [(a.day, a.label, "") for a in self._ahead]
+        labels.sort(key=lambda w: (w[0] != self._visits[0].performed_on, w[0]))
+        placed: list[float] = []
+        for day, label, css in labels:
             x = self._x(day)
-            if all(abs(x - other) * self._width / 1000 >= LABEL_PX for other in taken):
-                taken.append(x)
+            if all(abs(x - position) * self._width / 1000 >= LABEL_PX for position in placed):
+                placed.append(x)
                 self.add_text(_pct(x), self.height, label, css, "middle", dy=15)
         for planned in self._ahead:
             self.add_upright("ax", self._x(planned.day))
@@ -154,7 +154,7 @@ class _TrendPlot(PlotArea):
             self.add_text(x, y, format_number(p.value, digits), "strong halo", "middle", dy=-11)
 
     def labels(self, line: TrendSeries) -> None:
-        """Name band and limit where nothing is measured yet, else in the middle, away from the two values."""
+        """Label band and limit where there are no data, otherwise in the middle, away from the two values."""
         base = line.start
         last = max(v.performed_on for v in self._visits)
         free = self._alone or any(a.day > last for a in self._ahead)

@@ -1,4 +1,4 @@
-"""The trend on the first sheet of paper: speed and score over the visits walked alike, in three lines."""
+"""Trend on the first printed page: speed and score over comparable visits, in three lines."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ WIDTH, HEIGHT, ROOM = 74, 15, 4
 
 @dataclass(frozen=True)
 class TrendStripLine:
-    """One side of a figure, or the whole take.
+    """One side of a parameter, or the whole trial.
 
     Parameters
     ----------
-    values : as printed, one per shown visit; "–" where there is none. estimated : which of them are.
-    change : of the last visit since `since`, None where either has no value. limit : its measurement error
-        (MDC), "" where none is known. why_none : no change is said, "" where one is or the last visit has
-        no value. since : day of the visit that it counts from, None = the first one.
+    values : as printed, one per displayed visit; "–" if missing. estimated : mask of estimated values.
+    change : of the last visit since `since`, None if either has no value. limit : its measurement error
+        (MDC), "" if unknown. why_none : reason for a missing change, "" if there is one or the last visit has
+        no value. since : date of the base visit, None = the first one.
     """
 
     title: str
@@ -63,14 +63,14 @@ class TrendStripLine:
 
 @dataclass(frozen=True)
 class TrendStrip:
-    """The lines over the shown visits.
+    """The lines over the displayed visits.
 
     Parameters
     ----------
-    days : of the shown visits, oldest first. hidden : how many visits between the first two are not shown.
-    missing : day and reason of each value that is not there, the same ones once.
-    later : title and day of what changed since a later visit than the first, which has no value to compare
-        with: none, an estimated one, or one of training.
+    days : of the displayed visits, oldest first. hidden : number of omitted visits between the first two.
+    missing : date and reason of each missing value, without repetition.
+    later : title and date for changes since a later visit than the first, whose value is missing, estimated
+        or from a training.
     """
 
     days: tuple[dt.date, ...]
@@ -81,11 +81,11 @@ class TrendStrip:
 
 
 def trend_strip(visits: Sequence[AnalysedVisit], affected: Side | None = None) -> TrendStrip | None:
-    """Follow speed and score up to the last of these visits; None of fewer than three.
+    """Trend of speed and score up to the last of these visits; None for fewer than three.
 
     Parameters
     ----------
-    visits : walked alike, oldest first. affected : side, None = none or both.
+    visits : under the same condition, oldest first. affected : side, None = none or both.
     """
     if len(visits) < LEAST_VISITS:
         return None
@@ -96,20 +96,20 @@ def trend_strip(visits: Sequence[AnalysedVisit], affected: Side | None = None) -
     if not chosen:
         return None
     hidden = max(0, len(visits) - MOST_COLUMNS)
-    shown = [0, *range(1 + hidden, len(visits))]
+    indices = [0, *range(1 + hidden, len(visits))]
     missing = {
         (visits[i].performed_on, _explain(visits[i], trend.name, line.side))
         for trend, line in chosen
-        for i in set(shown).difference(p.visit for p in line.points)
+        for i in set(indices).difference(p.visit for p in line.points)
     }
-    lines = tuple(_write_line(trend.term, line, visits, shown) for trend, line in chosen)
+    lines = tuple(_write_line(trend.term, line, visits, indices) for trend, line in chosen)
     later = dict.fromkeys((line.title, line.since) for line in lines if line.since is not None)
-    days = tuple(visits[i].performed_on for i in shown)
+    days = tuple(visits[i].performed_on for i in indices)
     return TrendStrip(days, hidden, lines, tuple(sorted(missing)), tuple(later))
 
 
 def _write_line(
-    term: Term, line: TrendSeries, visits: Sequence[AnalysedVisit], shown: Sequence[int]
+    term: Term, line: TrendSeries, visits: Sequence[AnalysedVisit], indices: Sequence[int]
 ) -> TrendStripLine:
     points = {p.visit: p for p in line.points}
     last = points.get(len(visits) - 1)
@@ -119,8 +119,8 @@ def _write_line(
         term.label,
         term.unit,
         line.side,
-        tuple(format_number(points[i].value, term.digits) if i in points else "–" for i in shown),
-        tuple(i in points and points[i].estimated for i in shown),
+        tuple(format_number(points[i].value, term.digits) if i in points else "–" for i in indices),
+        tuple(i in points and points[i].estimated for i in indices),
         _draw_line(line, visits),
         None if change is None else change_words(change),
         "" if change is None or change.limit is None else format_limit(change.limit, term),
@@ -141,12 +141,12 @@ def _explain_none(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
 
 
 def _explain(visit: AnalysedVisit, name: str, side: Side | None) -> str:
-    there = (p for p in collect_figures(visit.numbers) if (p.name, p.side) == (name, side))
-    return reason_words(next((p.reason for p in there), None))
+    matching = (p for p in collect_figures(visit.numbers) if (p.name, p.side) == (name, side))
+    return reason_words(next((p.reason for p in matching), None))
 
 
 def _draw_line(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
-    """A small line over the days of all visits, the measurement error around its base as a band."""
+    """A small line over the dates of all visits, with the measurement error of its base as a band."""
     first = visits[0].performed_on
     days = max(1, (visits[-1].performed_on - first).days)
     band = () if line.mdc is None else (line.start - line.mdc, line.start + line.mdc)

@@ -1,8 +1,8 @@
-"""Figures over the visits of a person: what changed since the first assessment, and by how much it must.
+"""Parameters over a patient's visits: changes since the first assessment, and the change required.
 
-All of them are walked under one condition. The first assessment is the base: its measurement error is the
-band that a later value must leave to be a real change (docs/science/change.md, "Verdict"). Trainings are
-shown and never the base; with feedback they are not compared with it either.
+All visits have the same walking condition. The first assessment is the base: its measurement error is the
+band that a later value must leave to count as a real change (docs/science/change.md, "Verdict"). Trainings
+are displayed but never used as the base; those with feedback are not compared with it.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class AnalysedVisit:
     ----------
     label : of the planned visit, "PRE" or "T4"; None outside a programme.
     kind : an unplanned session counts as an assessment, one with feedback as a training.
-    condition : how it was walked. numbers : what was measured.
+    condition : walking condition. numbers : results.
     """
 
     session_id: str
@@ -62,7 +62,7 @@ class AnalysedVisit:
 
     @property
     def feedback(self) -> bool:
-        """It was walked with feedback."""
+        """Whether feedback was given."""
         return self.condition.feedback
 
 
@@ -70,7 +70,7 @@ class AnalysedVisit:
 class TrendPoint:
     """A value at a visit (index into `visits`); `change` from the first assessment, null with feedback.
 
-    `estimated`: a model of the leg gives it, no two sensors measure it.
+    `estimated`: from a leg model rather than measured by two sensors.
     """
 
     visit: int
@@ -85,13 +85,13 @@ class TrendPoint:
 
 @dataclass(frozen=True)
 class TrendSeries:
-    """One side of a figure, or the whole take.
+    """One side of a parameter, or the whole trial.
 
     Parameters
     ----------
-    points : visits with a value, oldest first. base : index of the first assessment among them, of the first
-        that was measured if any was; None = none.
-    latest : index of the last assessment after it, else None: nothing to judge yet.
+    points : visits with a value, oldest first. base : index of the first assessment among them, preferably a
+        measured one; None = none.
+    latest : index of the last assessment after it, None if there is none yet.
     mdc, mcid : around the base; None without a source.
     """
 
@@ -104,18 +104,18 @@ class TrendSeries:
 
     @property
     def start(self) -> float:
-        """Value that the limits lie around: of the base; without one there are no limits."""
+        """Value at the base, around which limits are drawn; without a base there are no limits."""
         return self.points[self.base or 0].value
 
     @property
     def change(self) -> Change | None:
-        """From the first to the last assessment."""
+        """Change from the first to the last assessment."""
         return None if self.latest is None else self.points[self.latest].change
 
 
 @dataclass(frozen=True, eq=False)
 class Trend:
-    """A figure over the visits; `norm` = of people like this one, None where nobody compares."""
+    """A parameter over the visits; `norm` = for comparable subjects, None if unavailable."""
 
     name: str
     term: Term
@@ -124,10 +124,10 @@ class Trend:
 
 
 def names_in(visits: Sequence[AnalysedVisit]) -> tuple[str, ...]:
-    """Figures with a value in any visit, in the order of the table."""
-    found = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
-    known = (*CATALOGUE, *SCORE_TERMS)
-    return (*(n for n in known if n in found), *sorted(found.difference(known)))
+    """Parameters with a value at any visit, in table order."""
+    names = {p.name for visit in visits for p in collect_figures(visit.numbers) if p.mean is not None}
+    ordered = (*CATALOGUE, *SCORE_TERMS)
+    return (*(n for n in ordered if n in names), *sorted(names.difference(ordered)))
 
 
 def follow_figures(
@@ -137,36 +137,36 @@ def follow_figures(
     usual: Mapping[str, NormValue] | None = None,
     affected: Side | None = None,
 ) -> tuple[Trend, ...]:
-    """Follow figures over visits of one condition, oldest first; those without a value are left out.
+    """Trends of parameters over visits of one condition, oldest first; those without values are omitted.
 
     Parameters
     ----------
-    norms : of this person, one of every visit at its speed; empty = none. A trend shows that of the last
-        visit without feedback.
-    usual : of people of this age and sex at their own comfortable speed; the reference of speed itself,
-        which cannot be matched by speed.
+    norms : for the patient, one per visit at its speed; empty = none. A trend shows that of the last visit
+        without feedback.
+    usual : norms for this age and sex at comfortable speed; the reference for speed itself, which cannot be
+        matched by speed.
     affected : side, None = none or both.
     """
     tables = [{(p.name, p.side): p for p in collect_figures(visit.numbers)} for visit in visits]
-    found = []
+    trends = []
     last = next((i for i in reversed(range(len(visits))) if not visits[i].feedback), len(visits) - 1)
     for name in names:
         norm = _norm(name, visits, norms[last] if norms else None, usual or {})
         lines = [_line(name, side, visits, tables, norms, affected) for side in (None, *SIDES)]
-        kept = tuple(line for line in lines if line is not None)
-        if kept:
-            found.append(Trend(name, find_term(name, _unit(name, tables)), kept, norm))
-    return tuple(found)
+        series = tuple(line for line in lines if line is not None)
+        if series:
+            trends.append(Trend(name, find_term(name, _unit(name, tables)), series, norm))
+    return tuple(trends)
 
 
 def collect_figures(numbers: Numbers) -> tuple[Parameter, ...]:
-    """Parameters, and the scores of the two legs as if they were."""
-    made = [
+    """Parameters, and the scores of the two legs in the form of parameters."""
+    as_parameters = [
         Parameter(s.name, s.side, s.n, s.value, None, s.unit, s.reason)
         for s in numbers.scores
         if s.name in SCORE_TERMS and s.mode == SCORE_MODE and s.side is not None
     ]
-    return (*numbers.parameters, *made)
+    return (*numbers.parameters, *as_parameters)
 
 
 Table = Mapping[tuple[str, Side | None], Parameter]
@@ -227,8 +227,8 @@ def _line(
         i, p, _ = measured[k]
         if first is None or k == base or visits[i].feedback:
             return None
-        at = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
-        return parameter_changes([first], [p], affected, at)[0]
+        norm_pair = (norms[measured[base or 0][0]].values, norms[i].values) if norms else None
+        return parameter_changes([first], [p], affected, norm_pair)[0]
 
     points = [
         TrendPoint(i, value, p.sd, p.n, p.ci_low, p.ci_high, change(k), p.estimated)
@@ -242,7 +242,7 @@ def _line(
 def _limits(
     first: Parameter, points: Sequence[TrendPoint], latest: int | None, affected: Side | None
 ) -> tuple[float | None, float | None]:
-    """What the last assessment is judged by; before there is one, what it will be."""
+    """Limits for the last assessment or, before there is one, for the next."""
     change = None if latest is None else points[latest].change
     if change is not None and change.difference is not None:
         return change.limit, change.mcid

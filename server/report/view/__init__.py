@@ -1,1 +1,1 @@
-"""An analysis as one page shows it: tables, checks, headline, quality."""
+"""View models of an analysis: tables, checks, headline, quality."""

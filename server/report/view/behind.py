@@ -1,4 +1,4 @@
-"""What is behind a number: the strides it is the mean of, and those it is not, each with its moment."""
+"""Strides of a parameter, included and excluded, each with its time."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from sagittal.core.events.result import Strides
 from sagittal.core.frames import SIDES, Side
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.rows import Column
+from sagittal.core.user_text import quote
 from sagittal.server.report.charts.svg import KEY, find_round_ticks, make_label, make_time_labels
 from sagittal.server.report.files.columns import reduce_to_plain
 from sagittal.server.report.view.level import define_parameter
 from sagittal.server.report.view.table import ParameterRow
 from sagittal.server.report.words.wording import explain_exclusion, format_number
-from sagittal.web.user_text import quote
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
@@ -27,7 +27,7 @@ CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr"
 
 @dataclass(frozen=True)
 class StrideValue:
-    """The figure of one stride, null where it has none; `index` is its place in the stride list."""
+    """Value of one stride, null if missing; `index` is its position in the stride list."""
 
     index: int
     side: Side
@@ -45,8 +45,8 @@ class ParameterStrides:
 
     Parameters
     ----------
-    row : as in the table. definition : in a sentence. strides : of the whole list; empty for a figure that is
-        not one of strides. svg : its strides over time, empty without any.
+    row : as in the table. definition : in a sentence. strides : all strides; empty for a parameter not based
+        on strides. svg : chart of the strides over time, empty without any.
     """
 
     row: ParameterRow
@@ -55,7 +55,7 @@ class ParameterStrides:
     svg: str
 
     def to_json(self) -> dict[str, object]:
-        """The same as plain values for JSON."""
+        """Convert to JSON types."""
         content = {
             "parameter": self.row,
             "definition": self.definition,
@@ -68,11 +68,11 @@ class ParameterStrides:
 def open_row(
     row: ParameterRow, strides: Strides, column: Column | None, duration_s: float
 ) -> ParameterStrides:
-    """Open a row of the table.
+    """Strides of a table row.
 
     Parameters
     ----------
-    column : the figure of every stride of the list, None where it is not one of strides.
+    column : values of all strides, None if the parameter is not based on strides.
     """
     digits = CATALOGUE[row.name].digits if row.name in CATALOGUE else 2
     values = () if column is None else tuple(
@@ -92,11 +92,13 @@ def open_row(
 
 
 def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) -> str:
-    """Every stride as a mark that leads to its moment, the norm as a band, means of the counted as lines."""
-    shown = [s for s in values if s.value is not None]
-    if not shown or duration_s <= 0.0:
+    """Chart of all strides as linked marks, with the norm as a band and means of the included ones as
+    lines.
+    """
+    valued = [s for s in values if s.value is not None]
+    if not valued or duration_s <= 0.0:
         return ""
-    figures = [s.value for s in shown if s.value is not None]
+    figures = [s.value for s in valued if s.value is not None]
     if row.norm_mean is not None and row.norm_sd is not None:
         figures += [row.norm_mean - row.norm_sd, row.norm_mean + row.norm_sd]
     low, high = min(figures), max(figures)
@@ -112,15 +114,15 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
         top, foot = y(row.norm_mean + row.norm_sd), y(row.norm_mean - row.norm_sd)
         parts.append(f'<rect class="band" x="0" width="100%" y="{top:.1f}" height="{foot - top:.1f}"/>')
     ticks, digits = find_round_ticks(low, high)
-    for at in ticks:
-        parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(at):.1f}" y2="{y(at):.1f}"/>')
-        parts.append(make_label("0", y(at), format_number(at, digits), "", "end", dx=-7, dy=4))
+    for tick in ticks:
+        parts.append(f'<line class="g" x1="0" x2="100%" y1="{y(tick):.1f}" y2="{y(tick):.1f}"/>')
+        parts.append(make_label("0", y(tick), format_number(tick, digits), "", "end", dx=-7, dy=4))
     parts.append(make_time_labels(duration_s, HEIGHT, -6))
     for side, cell in zip(SIDES, (row.left, row.right), strict=True):
         if cell is not None:
             line = f'x1="0" x2="100%" y1="{y(cell.value):.1f}" y2="{y(cell.value):.1f}"'
             parts.append(f'<line class="m{KEY[side]}" {line}/>')
-    parts += [_mark(s, y(s.value), duration_s) for s in shown if s.value is not None]
+    parts += [_mark(s, y(s.value), duration_s) for s in valued if s.value is not None]
     return (
         f'<div class="chart behind"><svg width="100%" height="{HEIGHT}" overflow="visible" role="group">'
         f"<title>{escape(row.title)} of every stride over time</title>{''.join(parts)}</svg></div>"
@@ -130,11 +132,11 @@ def _chart(row: ParameterRow, values: Sequence[StrideValue], duration_s: float) 
 def _mark(s: StrideValue, y: float, duration_s: float) -> str:
     css, radius = CSS[s.side]
     x = 100 * 0.5 * (s.start_s + s.end_s) / duration_s
-    said = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
+    title = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
         f", left out: {quote(s.excluded)}" if s.excluded else ""
     )
     faded = "" if s.counted else " out"
     return (
         f'<a href="timeline#t={s.start_s:.3f}"><circle class="{css}{faded}" cx="{x:.2f}%" cy="{y:.1f}" '
-        f'r="{radius}"><title>{escape(said)}</title></circle></a>'
+        f'r="{radius}"><title>{escape(title)}</title></circle></a>'
     )

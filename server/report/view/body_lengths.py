@@ -1,4 +1,4 @@
-"""The lengths of the body that an analysis used: how long, measured or estimated, by what."""
+"""Body segment lengths used by an analysis, with method and origin."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ BY_PELVIS: Final = "Harrington 2007, from the measured pelvis"
 
 @dataclass(frozen=True)
 class BodyLength:
-    """One length as text, whether it was measured, and where it comes from."""
+    """One length as text, whether it was measured, and its origin."""
 
     title: str
     value: str
@@ -32,7 +32,7 @@ class BodyLength:
 
 
 def view_lengths(body: Mapping[str, Any] | None) -> tuple[BodyLength, ...]:
-    """View of `body` in analysis.json; empty where no body was placed."""
+    """View of `body` in analysis.json; empty if no body was constructed."""
     if body is None:
         return ()
     height = body["height_m"]

@@ -1,4 +1,4 @@
-"""The score of a calibration as its page shows it: the whole in one sentence, then every sensor."""
+"""View of a calibration score: overall result in one sentence, then all sensors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ WHOLE: Final = "take"
 
 @dataclass(frozen=True)
 class CheckRow:
-    """One check: its value and limit as text, a shape and a word for the verdict, why, and what to do."""
+    """One check: value and limit as text, symbol and word of the result, reason, and remedy."""
 
     title: str
     value: str
@@ -38,13 +38,13 @@ class CheckRow:
 
 @dataclass(frozen=True)
 class CheckedSegment:
-    """One sensor, or the whole take.
+    """One sensor, or the whole trial.
 
     Parameters
     ----------
-    id : segment, or `WHOLE`. method : how its forward axis was found, empty where it was not.
-    sigma : uncertainty of that axis as text; empty where the calibration does not say it. told : warnings of
-        the analysis about this sensor, such as that it slipped after the calibration.
+    id : segment, or `WHOLE`. method : method for its forward axis, empty if undetermined.
+    sigma : uncertainty of that axis as text; empty if unknown.
+    told : warnings about this sensor, such as a slip after calibration.
     """
 
     id: str
@@ -59,7 +59,7 @@ class CheckedSegment:
 
 @dataclass(frozen=True)
 class CalibrationChecks:
-    """What the page shows: `kind` and `headline` of the whole, sensors from the trunk down."""
+    """View of the page: overall `kind` and `headline`, sensors from the trunk downwards."""
 
     kind: str
     headline: str
@@ -67,7 +67,7 @@ class CalibrationChecks:
 
     @property
     def of_segment(self) -> Mapping[str, CheckedSegment]:
-        """Segment → its checks, for the picture."""
+        """Segment → its checks, for the diagram."""
         return {s.id: s for s in self.segments}
 
 
@@ -77,16 +77,16 @@ def view_calibration_checks(
     """View of `calibration_score`, `calibration` and notices of analysis.json; None without a score."""
     if score is None:
         return None
-    told: dict[str | None, list[str]] = {}
+    notices_by_sensor: dict[str | None, list[str]] = {}
     for notice in warnings:
         if notice.severity != "info":
-            told.setdefault(notice.sensor, []).append(speak_places(notice.message))
+            notices_by_sensor.setdefault(notice.sensor, []).append(speak_places(notice.message))
     checks: Sequence[Mapping[str, Any]] = score["checks"]
-    worn = [s for s in SEGMENTS if s in score["segments"]]
+    present = [s for s in SEGMENTS if s in score["segments"]]
     mounted = {} if calibration is None else calibration["segments"]
     whole = [c for c in checks if c["segment"] is None]
-    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in worn]
-    segments = [replace(s, told=tuple(told.get(s.id, ()))) for s in segments]
+    segments = [_view_segment(s, score["segments"][s], checks, mounted.get(s, {})) for s in present]
+    segments = [replace(s, told=tuple(notices_by_sensor.get(s.id, ()))) for s in segments]
     if whole:
         kinds = {c["verdict"] for c in whole}
         verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")
@@ -99,22 +99,22 @@ def view_calibration_checks(
 
 
 def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
-    """The overall verdict in one sentence."""
-    judged = [c for c in checks if c["verdict"] != "not_judged"]
+    """Overall result in one sentence."""
+    checked = [c for c in checks if c["verdict"] != "not_judged"]
     if verdict == "pass":
         return plural(
-            len(judged),
+            len(checked),
             "The calibration passes the one check that could be judged.",
-            f"The calibration passes all {len(judged)} checks that could be judged.",
+            f"The calibration passes all {len(checked)} checks that could be judged.",
         )
     if verdict == "not_judged":
         return "This take allows no check of its calibration."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
-    shown = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
-    listed = " and ".join(filter(None, (", ".join(shown[:-1]), shown[-1])))
+    shortened = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
+    listed = " and ".join(filter(None, (", ".join(shortened[:-1]), shortened[-1])))
     which = plural(len(failed), "checks fails", "checks fail")
-    return f"Calibrate again: {len(failed)} of {len(judged)} {which}, at the {listed}."
+    return f"Calibrate again: {len(failed)} of {len(checked)} {which}, at the {listed}."
 
 
 def _view_segment(
@@ -150,7 +150,7 @@ def _view_check(check: Mapping[str, Any]) -> CheckRow:
 
 
 def _write(value: float, unit: str) -> str:
-    """A value with its unit: degrees and percent to a tenth, shares to a hundredth, counts as they are."""
+    """A value with its unit: degrees and percent to one decimal, fractions to two, counts as integers."""
     if unit:
         return f"{format_number(value, 1)}{'' if unit == '°' else chr(0x202F)}{unit}"
     return format_number(value, 0 if value == round(value) and value > 1 else 2)

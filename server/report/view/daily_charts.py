@@ -1,7 +1,7 @@
-"""Drawings of daily life: the ribbon of a day, trunk inclination below it, walking bouts, steps.
+"""Charts of daily life: activity ribbon, trunk inclination, walking bouts, steps.
 
-A kind is told by its colour and by the height of its bar; what is not known is hatched or dotted. The rules
-are those of all charts (server/report/charts/svg.py).
+Activities are distinguished by colour and bar height; unknown periods are hatched or dotted. Follows the
+conventions of all charts (server/report/charts/svg.py).
 """
 
 from __future__ import annotations
@@ -64,25 +64,25 @@ HOURS: Final = (0, 3, 6, 9, 12, 15, 18, 21, 24)
 LEAN_RANGE: Final = (-90.0, 90.0)
 
 
-def ribbon_svg(found: ActivityResult, day: DayTotals) -> str:
-    """Draw 24 hours of what the person did."""
+def ribbon_svg(activity: ActivityResult, day: DayTotals) -> str:
+    """Draw the activities of 24 hours."""
     plot = PlotArea((0.0, 1.0), RIBBON_PX)
     for hour in range(25):
         plot.add_upright("ax" if hour % 6 == 0 else "g", 1000 * hour / 24)
-    for kind, pieces in _find_pieces(found, day).items():
+    for kind, pieces in _find_pieces(activity, day).items():
         if kind in CSS:
             plot.add(
                 f'<path class="{CSS[kind]}" d="{"".join(_box(a, b, LEVELS[kind]) for a, b in pieces)}"/>'
             )
         if kind in PATTERNS:
             plot.add_fixed("".join(_patterned(kind, a, b) for a, b in pieces))
-    _add_hours(plot, found)
-    told = ", ".join(f"{c.lower()} {day.times[c]}" for c in TOTALS if day.times[c] != "0:00")
-    return plot.draw("chart ribbon", f"{day.label}, hours and minutes: {told}")
+    _add_hours(plot, activity)
+    summary = ", ".join(f"{c.lower()} {day.times[c]}" for c in TOTALS if day.times[c] != "0:00")
+    return plot.draw("chart ribbon", f"{day.label}, hours and minutes: {summary}")
 
 
 def kind_swatch(kind: ActivityKind) -> str:
-    """Draw the sign of a kind for the legend."""
+    """Draw the legend symbol of an activity."""
     width, height = 26, 14
     top = format_coordinate(height * (1.0 - LEVELS[kind]))
     box = f'x="0" y="{top}" width="{width}" height="{format_coordinate(height * LEVELS[kind])}"'
@@ -94,14 +94,14 @@ def kind_swatch(kind: ActivityKind) -> str:
     )
 
 
-def inclination_svg(found: ActivityResult, day: DayTotals) -> str:
-    """Draw the inclination of the trunk over 24 hours: median and the middle 80 % of every ten minutes."""
+def inclination_svg(activity: ActivityResult, day: DayTotals) -> str:
+    """Draw trunk inclination over 24 hours: median and central 80 % of every ten minutes."""
     plot = PlotArea(LEAN_RANGE, RIBBON_PX)
     for hour in range(0, 25, 6):
         plot.add_upright("ax", 1000 * hour / 24)
     for tick in (-90.0, 0.0, 90.0):
         plot.add_tick("z" if tick == 0.0 else "g", tick, f"{format_number(tick, 0)}°")
-    t_s, course = inclination_course(found, day.start_s, day.end_s)
+    t_s, course = inclination_course(activity, day.start_s, day.end_s)
     x = 1000 * (t_s - day.midnight_s) / DAY_S
     wide = 1000 * COURSE_S / DAY_S
     for run in _known_runs(course[:, 1]):
@@ -112,32 +112,32 @@ def inclination_svg(found: ActivityResult, day: DayTotals) -> str:
             for k, (a, b, v) in enumerate(zip(ends[:-1], ends[1:], course[run, 1].tolist(), strict=True))
         )
         plot.add(f'<path class="mb" d="{middle}"/>')
-    _add_hours(plot, found)
-    known = course[np.isfinite(course[:, 1]), 1]
-    told = (
-        f"medians of ten minutes from {known.min():.0f} to {known.max():.0f} degrees"
-        if len(known)
+    _add_hours(plot, activity)
+    medians = course[np.isfinite(course[:, 1]), 1]
+    summary = (
+        f"medians of ten minutes from {medians.min():.0f} to {medians.max():.0f} degrees"
+        if len(medians)
         else "not known"
     )
-    return plot.draw("chart ribbon", f"Trunk inclination on {day.label}: {told}")
+    return plot.draw("chart ribbon", f"Trunk inclination on {day.label}: {summary}")
 
 
 def bouts_svg(bins: Sequence[BoutBin]) -> str:
-    """Draw the number of walking bouts by their length."""
+    """Draw the number of walking bouts by length."""
     bars = [(b.label, float(b.bouts), True) for b in bins]
     return bars_svg(bars, "Walking bouts by length; the table has the numbers", height=150)
 
 
-def steps_svg(found: ActivityResult, days: Sequence[DayTotals]) -> str:
-    """Draw steps of every day; of a single day steps of every hour."""
-    if len(found.days) > 1:
+def steps_svg(activity: ActivityResult, days: Sequence[DayTotals]) -> str:
+    """Draw steps per day, or per hour for a single day."""
+    if len(activity.days) > 1:
         bars = [
             (d.label, float(own.steps) if own.worn_h > 0.0 else None, d.counted)
-            for d, own in zip(days, found.days, strict=True)
+            for d, own in zip(days, activity.days, strict=True)
         ]
         return bars_svg(bars, "Steps per day; the table has the numbers", height=150)
     counts = np.zeros(24)
-    for h in found.hours:
+    for h in activity.hours:
         counts[int((h.start_s - days[0].midnight_s) // 3600) % 24] += h.steps
     hours = [(str(i) if i % 3 == 0 else "", float(n), True) for i, n in enumerate(counts.tolist())]
     return bars_svg(hours, "Steps per hour; the table has the numbers", height=150, values=False)
@@ -146,11 +146,11 @@ def steps_svg(found: ActivityResult, days: Sequence[DayTotals]) -> str:
 def bars_svg(
     bars: Sequence[tuple[str, float | None, bool]], title: str, height: int, *, values: bool = True
 ) -> str:
-    """Draw bars with their numbers above them.
+    """Draw bars with their values above them.
 
     Parameters
     ----------
-    bars : label, height (None = not known, a dash), and whether it is full: one that is not is dashed.
+    bars : label, height (None = unknown, drawn as a dash), and whether complete; incomplete ones are dashed.
     values : write the numbers.
     """
     top = max((value for _, value, _ in bars if value is not None), default=0.0) or 1.0
@@ -163,18 +163,18 @@ def bars_svg(
         middle = (i + 0.5) * wide
         if value:
             plot.add_band("bar" if full else "bar part", 0.0, value, middle - 0.35 * wide, 0.7 * wide)
-        at = f"{format_coordinate(middle / 10)}%"
-        plot.add_text(at, height, label, "", "middle", dy=16)
+        x_text = f"{format_coordinate(middle / 10)}%"
+        plot.add_text(x_text, height, label, "", "middle", dy=16)
         if values:
             text = DASH if value is None else format_number(value, 0)
-            plot.add_text(at, plot.px(value or 0.0), text, "strong", "middle", dy=-5)
+            plot.add_text(x_text, plot.px(value or 0.0), text, "strong", "middle", dy=-5)
     return plot.draw("chart bars", title)
 
 
-def _find_pieces(found: ActivityResult, day: DayTotals) -> dict[ActivityKind, list[tuple[int, int]]]:
-    """Runs of half minutes [first, last) of every kind; outside the recording there are none."""
+def _find_pieces(activity: ActivityResult, day: DayTotals) -> dict[ActivityKind, list[tuple[int, int]]]:
+    """Runs of half minutes [first, last) of every activity; none outside the recording."""
     share = np.zeros((len(KINDS), SLOTS))
-    for s in found.spans:
+    for s in activity.spans:
         a = (max(s.start_s, day.start_s) - day.midnight_s) / SLOT_S
         b = (min(s.end_s, day.end_s) - day.midnight_s) / SLOT_S
         if b <= a:
@@ -196,13 +196,13 @@ def _find_pieces(found: ActivityResult, day: DayTotals) -> dict[ActivityKind, li
 
 
 def _box(first: int, last: int, level: float) -> str:
-    """A bar of a path, 0 to 1000 both ways."""
+    """Path of a bar, 0 to 1000 both ways."""
     x, wide = 1000 * first / SLOTS, 1000 * (last - first) / SLOTS
     return f"M{x:.2f} 1000V{format_coordinate(1000 * (1 - level))}h{wide:.2f}V1000z"
 
 
 def _patterned(kind: ActivityKind, first: int, last: int) -> str:
-    """A bar whose pattern must not stretch."""
+    """A bar with a pattern that does not stretch."""
     height = RIBBON_PX * LEVELS[kind]
     return (
         f'<rect fill="url(#{PATTERNS[kind]})" x="{100 * first / SLOTS:.3f}%" '
@@ -212,24 +212,24 @@ def _patterned(kind: ActivityKind, first: int, last: int) -> str:
     )
 
 
-def _add_hours(plot: PlotArea, found: ActivityResult) -> None:
-    unit = ":00" if found.started_at is not None else "\u202fh"
+def _add_hours(plot: PlotArea, activity: ActivityResult) -> None:
+    unit = ":00" if activity.started_at is not None else "\u202fh"
     for hour in HOURS:
         anchor = "start" if hour == 0 else "end" if hour == 24 else "middle"
-        at = f"{format_coordinate(100 * hour / 24)}%"
-        plot.add_fixed(make_label(at, plot.height, f"{hour}{unit}", "", anchor, dy=14))
+        x_text = f"{format_coordinate(100 * hour / 24)}%"
+        plot.add_fixed(make_label(x_text, plot.height, f"{hour}{unit}", "", anchor, dy=14))
 
 
 def _known_runs(values: Floats) -> list[slice]:
-    """Stretches without NaN."""
-    known = np.concatenate(([False], np.isfinite(values), [False]))
-    starts = np.flatnonzero(~known[:-1] & known[1:]).tolist()
-    ends = np.flatnonzero(known[:-1] & ~known[1:]).tolist()
+    """Runs without NaN."""
+    finite = np.concatenate(([False], np.isfinite(values), [False]))
+    starts = np.flatnonzero(~finite[:-1] & finite[1:]).tolist()
+    ends = np.flatnonzero(finite[:-1] & ~finite[1:]).tolist()
     return [slice(a, b) for a, b in zip(starts, ends, strict=True)]
 
 
 def _outline(plot: PlotArea, ends: Sequence[float], course: Floats) -> str:
-    """Steps along the upper values and back along the lower ones."""
+    """Outline along the upper values and back along the lower ones."""
     up = [(x, plot.y(v)) for i, v in enumerate(course[:, 2].tolist()) for x in (ends[i], ends[i + 1])]
     low = [(x, plot.y(v)) for i, v in enumerate(course[:, 0].tolist()) for x in (ends[i], ends[i + 1])]
     return "M" + "L".join(_point(x, y) for x, y in (*up, *reversed(low))) + "z"

@@ -1,7 +1,7 @@
-"""A recording of daily life in words: days, hours, transitions, walking bouts and trunk inclination.
+"""View of a daily-life recording: days, hours, transitions, walking bouts and trunk inclination.
 
-What the monitor found is core/activity/result.py; the drawings are server/report/view/daily_charts.py,
-names of kinds and days server/report/words/daily_words.py.
+For the results see core/activity/result.py, for the charts server/report/view/daily_charts.py, for names of
+activities and days server/report/words/daily_words.py.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ class DayTotals:
 
     Parameters
     ----------
-    label : date, or "Day 2" without a clock. part : which part of it was recorded, empty for the whole day.
-    midnight_s : where its ribbon begins, from the first sample. times : column of TOTALS → h:min.
-    counted : worn long enough for the means.
+    label : date, or "Day 2" without a clock. part : recorded part, empty for the whole day.
+    midnight_s : start of its ribbon, relative to the first sample. times : column of TOTALS → h:min.
+    counted : wear time is sufficient for the means.
     """
 
     label: str
@@ -88,7 +88,7 @@ class HourTotals:
 
 @dataclass(frozen=True)
 class TransitionTotals:
-    """One kind of transition: how often on each day, and how large."""
+    """One kind of transition: count per day, and size."""
 
     label: str
     per_day: tuple[int, ...]
@@ -100,7 +100,7 @@ class TransitionTotals:
 
 @dataclass(frozen=True)
 class TransitionEvent:
-    """A transition, or a lean that does not count with its reason."""
+    """A transition, or a rejected forward lean with the reason."""
 
     when: str
     label: str
@@ -123,7 +123,7 @@ class BoutBin:
 
 @dataclass(frozen=True)
 class LeanRow:
-    """Trunk inclination during one kind, in whole degrees, positive forward."""
+    """Trunk inclination during one activity, in whole degrees, positive forward."""
 
     label: str
     hours: str
@@ -134,15 +134,15 @@ class LeanRow:
 
 @dataclass(frozen=True, eq=False)
 class DailyLifeView:
-    """What the page and the week report of daily life show.
+    """Content of the daily-life page and week report.
 
     Parameters
     ----------
-    found : what everything here was made from. place : where the sensor was worn.
-    has_clock : days and hours are those of the device's clock, else they count from the first sample.
-    columns : of the totals that have anything to say. mean : of the days worn long enough, None where there
-        is none. events : the first transitions and candidates in order of time, of `events_total`.
-    lean_reason : why no inclination is known, None where it is.
+    found : the underlying result. place : sensor placement.
+    has_clock : days and hours follow the device's clock, otherwise counted from the first sample.
+    columns : totals with data. mean : of days with sufficient wear time, None if there are none.
+    events : the first transitions and candidates in order of time, of `events_total`.
+    lean_reason : why inclination is unknown, None if known.
     """
 
     found: ActivityResult
@@ -161,7 +161,7 @@ class DailyLifeView:
     lean_reason: str | None
 
     def to_json(self) -> dict[str, object]:
-        """What of it goes into the report's JSON; spans, steps and inclination lie in files of their own."""
+        """Content of the report's JSON; spans, steps and inclination have separate files."""
         return {
             "segment": self.found.segment,
             "started_at": None if self.found.started_at is None else self.found.started_at.isoformat(),
@@ -172,40 +172,40 @@ class DailyLifeView:
         }
 
 
-def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
-    """Put a recording of daily life into words; None of any other take."""
-    if found is None:
+def daily_life_view(activity: ActivityResult | None) -> DailyLifeView | None:
+    """View of a daily-life recording; None for other trials."""
+    if activity is None:
         return None
-    days = tuple(_describe_day(found, i, d) for i, d in enumerate(found.days))
-    shown = tuple(
-        c for c, kinds in TOTALS.items() if c != "Not recorded" or any(found.minutes(k) for k in kinds)
+    days = tuple(_describe_day(activity, i, d) for i, d in enumerate(activity.days))
+    active = tuple(
+        c for c, kinds in TOTALS.items() if c != "Not recorded" or any(activity.minutes(k) for k in kinds)
     )
-    events: list[PosturalTransition | TransitionCandidate] = [*found.transitions, *found.candidates]
+    events: list[PosturalTransition | TransitionCandidate] = [*activity.transitions, *activity.candidates]
     events.sort(key=lambda e: e.time_s)
-    leans = _describe_leans(found)
+    leans = _describe_leans(activity)
     return DailyLifeView(
-        found=found,
-        place="chest" if found.segment == "chest" else "lower back",
-        has_clock=found.started_at is not None,
-        columns=shown,
+        found=activity,
+        place="chest" if activity.segment == "chest" else "lower back",
+        has_clock=activity.started_at is not None,
+        columns=active,
         days=days,
-        mean=_average(found.days),
+        mean=_average(activity.days),
         hours=tuple(
             HourTotals(
-                find_day_label(found, h.start_s),
-                clock_label(found, h.start_s),
+                find_day_label(activity, h.start_s),
+                clock_label(activity, h.start_s),
                 h.steps,
-                {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in shown},
+                {c: format_number(_sum(h.minutes, TOTALS[c]), 0) for c in active},
             )
-            for h in found.hours
+            for h in activity.hours
         ),
-        transitions=tuple(_count_transitions(found, kind) for kind in TRANSITIONS),
-        events=tuple(_describe_event(found, e) for e in events[:EVENTS_SHOWN]),
+        transitions=tuple(_count_transitions(activity, kind) for kind in TRANSITIONS),
+        events=tuple(_describe_event(activity, e) for e in events[:EVENTS_SHOWN]),
         events_total=len(events),
-        bins=bin_bouts(found.bouts),
+        bins=bin_bouts(activity.bouts),
         stairs_steps=(
-            sum(b.stairs_up_steps for b in found.bouts),
-            sum(b.stairs_down_steps for b in found.bouts),
+            sum(b.stairs_up_steps for b in activity.bouts),
+            sum(b.stairs_down_steps for b in activity.bouts),
         ),
         leans=leans,
         lean_reason=None if leans else "not known: no lean of the trunk showed which way is forward",
@@ -213,7 +213,7 @@ def daily_life_view(found: ActivityResult | None) -> DailyLifeView | None:
 
 
 def bin_bouts(bouts: Sequence[ActivityBout]) -> tuple[BoutBin, ...]:
-    """Sort walking bouts by their length."""
+    """Group walking bouts by length."""
     ends = [*BIN_EDGES_S, np.inf]
     places = np.searchsorted(BIN_EDGES_S, [b.duration_s for b in bouts], "right")
     rows = []
@@ -245,28 +245,28 @@ def _bin_label(low: float, high: float) -> str:
     return f"{low / size:.0f}–{high / size:.0f}\u202f{unit}"
 
 
-def _describe_day(found: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
-    begins = f"{clock_label(found, d.start_s)}–" if found.started_at is not None else ""
+def _describe_day(activity: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
+    begins = f"{clock_label(activity, d.start_s)}–" if activity.started_at is not None else ""
     whole = d.end_s - d.start_s > DAY_S - 60.0
-    ends = clock_label(found, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
-    worn = d.worn_h > 0.0
+    ends = clock_label(activity, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
+    is_worn = d.worn_h > 0.0
     return DayTotals(
         label=day_label(i, d.date),
         part="" if whole else begins + (ends if ends != "00:00" else "24:00"),
-        midnight_s=find_midnight(found, d.start_s),
+        midnight_s=find_midnight(activity, d.start_s),
         start_s=d.start_s,
         end_s=d.end_s,
         worn=format_hours(60.0 * d.worn_h),
         times={c: format_hours(_sum(d.minutes, kinds)) for c, kinds in TOTALS.items()},
-        steps=format_number(d.steps, 0) if worn else DASH,
-        bouts=str(d.bouts) if worn else DASH,
+        steps=format_number(d.steps, 0) if is_worn else DASH,
+        bouts=str(d.bouts) if is_worn else DASH,
         longest=DASH if d.longest_bout_s is None else format_number(d.longest_bout_s / 60.0, 1),
         counted=d.worn_h >= WORN_H,
     )
 
 
 def _average(days: Sequence[ActivityDay]) -> DayTotals | None:
-    """Mean of the days worn long enough."""
+    """Mean of the days with sufficient wear time."""
     own = [d for d in days if d.worn_h >= WORN_H]
     if not own:
         return None
@@ -291,12 +291,12 @@ def _sum(minutes: Mapping[ActivityKind, float], kinds: Sequence[ActivityKind]) -
     return sum(minutes.get(kind, 0.0) for kind in kinds)
 
 
-def _count_transitions(found: ActivityResult, kind: TransitionKind) -> TransitionTotals:
-    own = [t for t in found.transitions if t.kind == kind]
+def _count_transitions(activity: ActivityResult, kind: TransitionKind) -> TransitionTotals:
+    own = [t for t in activity.transitions if t.kind == kind]
     rises = [abs(t.rise_m) for t in own if t.rise_m is not None]
     return TransitionTotals(
         label=TRANSITION_LABELS[kind],
-        per_day=tuple(d.transitions.get(kind, 0) for d in found.days),
+        per_day=tuple(d.transitions.get(kind, 0) for d in activity.days),
         total=len(own),
         lean=format_number(float(np.median([t.lean_deg for t in own])), 0) if own else DASH,
         rise=format_number(float(np.median(rises)), 2) if rises else DASH,
@@ -304,8 +304,8 @@ def _count_transitions(found: ActivityResult, kind: TransitionKind) -> Transitio
     )
 
 
-def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
-    when = f"{find_day_label(found, e.time_s)} {clock_label(found, e.time_s)}"
+def _describe_event(activity: ActivityResult, e: PosturalTransition | TransitionCandidate) -> TransitionEvent:
+    when = f"{find_day_label(activity, e.time_s)} {clock_label(activity, e.time_s)}"
     lean = format_number(e.lean_deg, 0)
     rise = DASH if e.rise_m is None else format_number(e.rise_m, 2)
     if isinstance(e, TransitionCandidate):
@@ -315,9 +315,9 @@ def _describe_event(found: ActivityResult, e: PosturalTransition | TransitionCan
     return TransitionEvent(when, TRANSITION_LABELS[e.kind], lean, rise, status, counts=True)
 
 
-def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
-    """Median and the middle 90 % of inclination in each kind; not of lying: on a side none is forward."""
-    values, kinds = found.inclination_deg, label_seconds(found)
+def _describe_leans(activity: ActivityResult) -> tuple[LeanRow, ...]:
+    """Median and central 90 % of inclination per activity; lying is excluded."""
+    values, kinds = activity.inclination_deg, label_seconds(activity)
     rows = []
     for i, kind in enumerate(KINDS):
         own = values[kinds == i]
@@ -329,31 +329,31 @@ def _describe_leans(found: ActivityResult) -> tuple[LeanRow, ...]:
     return tuple(rows)
 
 
-def label_seconds(found: ActivityResult) -> np.ndarray:
-    """(seconds,) index into KINDS of what the middle of every second is."""
-    seconds = np.arange(len(found.inclination_deg)) + 0.5
-    places = np.searchsorted([s.start_s for s in found.spans], seconds, "right") - 1
-    kinds = np.array([KINDS.index(s.kind) for s in found.spans], dtype=np.intp)
+def label_seconds(activity: ActivityResult) -> np.ndarray:
+    """(seconds,) index into KINDS of the activity at the middle of every second."""
+    seconds = np.arange(len(activity.inclination_deg)) + 0.5
+    places = np.searchsorted([s.start_s for s in activity.spans], seconds, "right") - 1
+    kinds = np.array([KINDS.index(s.kind) for s in activity.spans], dtype=np.intp)
     return kinds[np.maximum(places, 0)] if len(kinds) else np.full(len(seconds), KINDS.index("gap"))
 
 
-def inclination_course(found: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
-    """Course of inclination in windows of COURSE_S.
+def inclination_course(activity: ActivityResult, start_s: float, end_s: float) -> tuple[Floats, Floats]:
+    """Inclination in windows of COURSE_S.
 
     Returns
     -------
-    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN where fewer than
-        a tenth of them are known.
+    t_s : (n,) start of each window. course : (n, 3) 10 %, 50 % and 90 % of its seconds, NaN if fewer than a
+        tenth of them are known.
     """
-    first, last = int(start_s), min(int(np.ceil(end_s)), len(found.inclination_deg))
+    first, last = int(start_s), min(int(np.ceil(end_s)), len(activity.inclination_deg))
     n = max(0, -(-(last - first) // COURSE_S))
     rows = np.full((n, COURSE_S), np.nan)
-    rows.flat[: max(0, last - first)] = found.inclination_deg[first:last]
+    rows.flat[: max(0, last - first)] = activity.inclination_deg[first:last]
     rows.sort(axis=1)
-    known = np.isfinite(rows).sum(axis=1)
+    finite = np.isfinite(rows).sum(axis=1)
     course = np.full((n, 3), np.nan)
-    enough = known * 10 >= COURSE_S
+    enough = finite * 10 >= COURSE_S
     for k, share in enumerate((0.1, 0.5, 0.9)):
-        place = np.round(share * np.maximum(known - 1, 0)).astype(np.intp)
+        place = np.round(share * np.maximum(finite - 1, 0)).astype(np.intp)
         course[enough, k] = rows[np.arange(n), place][enough]
     return first + COURSE_S * np.arange(n, dtype=np.float64), course

@@ -1,4 +1,4 @@
-"""What feedback did in a session: strides with and without it, probes, level, side effects, retention."""
+"""Outcome of feedback in a session: strides with and without it, probes, level, side effects, retention."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _HOW_TO_READ: Final = (
 
 @dataclass(frozen=True)
 class ProbeComparison:
-    """A probe block beside the training strides right before it."""
+    """A probe block and the training strides immediately before it."""
 
     number: int
     start_s: float
@@ -62,7 +62,7 @@ class ProbeComparison:
 
 @dataclass(frozen=True)
 class FeedbackView:
-    """The section of a session page, of its print, and of the interface."""
+    """Feedback section for the session page, print and API."""
 
     title: str
     words: tuple[tuple[str, str], ...]
@@ -79,17 +79,17 @@ class FeedbackView:
 
     @property
     def target(self) -> str:
-        """Mean ± sd and who they are of."""
+        """Mean ± sd and its source."""
         return target_words(self.content)
 
     @property
     def retention_words(self) -> str:
-        """How much the first strides of this visit differ from the last ones trained."""
+        """Difference of the first strides of this visit from the last trained ones."""
         return "" if self.retention is None else format_signed(self.retention.difference, self.term)
 
     def to_json(self) -> dict[str, object]:
-        """Plain JSON with every stride."""
-        shown = reduce_to_plain(
+        """JSON types with all strides."""
+        plain = reduce_to_plain(
             {
                 "prescription": self.content.to_json(),
                 "words": [f"{label}: {text}" for label, text in self.words],
@@ -109,11 +109,11 @@ class FeedbackView:
                 ],
             }
         )
-        return shown if isinstance(shown, dict) else {}
+        return plain if isinstance(plain, dict) else {}
 
 
 def list_analysed_strides(strides: Strides, column: Column) -> tuple[AnalysedStride, ...]:
-    """The stride list with the value of the trained parameter."""
+    """Strides with the value of the trained parameter."""
     return tuple(
         AnalysedStride(s.side, s.start_s, value, s.excluded_reason is None)
         for s, value in zip(strides.strides, column, strict=True)
@@ -124,14 +124,14 @@ def feedback_view(
     content: Prescription,
     split: FeedbackSplit,
     guard: GuardState,
-    before: PreviousTraining | None = None,
+    previous: PreviousTraining | None = None,
     limb: Limb | None = None,
 ) -> FeedbackView:
-    """Put the result of a take into words.
+    """View of the result of a trial.
 
     Parameters
     ----------
-    before : the visit whose end the retention block is held against. limb : of the trained side.
+    previous : visit whose end is compared with the retention block. limb : of the trained side.
     """
     term = parameter_term(content.parameter)
     rows = tuple(
@@ -156,7 +156,7 @@ def feedback_view(
         ),
         levels=tuple((s.n, s.t_s, s.level) for s in split.levels),
         effects=describe_effects(content, guard, term),
-        retention=None if before is None else compare_retention(content, split, before, term, limb),
+        retention=None if previous is None else compare_retention(content, split, previous, term, limb),
         notes=_notes(split, term),
         svg=feedback_svg(split, content, term) if split.strides else "",
         split=split,
@@ -164,16 +164,16 @@ def feedback_view(
 
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
-    """How to read it, and what could not be used."""
-    said = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
+    """Explanations, and data that could not be used."""
+    notes = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
-        said.append(
+        notes.append(
             f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
             f"{format_quantity(live.sd, term, term.digits + 1)}."
         )
-    for n, what in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
+    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
         if n:
             cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
-            said.append(f"{cues} {what} in the analysis.")
-    return tuple(said)
+            notes.append(f"{cues} {outcome} in the analysis.")
+    return tuple(notes)

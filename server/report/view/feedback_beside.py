@@ -1,4 +1,4 @@
-"""Beside the target: what else changed over a take, and what was left of the last training."""
+"""Side effects of feedback during a trial, and retention since the last training."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ EFFECT_REASONS: Final = {
 
 @dataclass(frozen=True)
 class SideEffectRow:
-    """A side effect; `kind` is ok, warn, or none where it cannot be judged."""
+    """A side effect; `kind` is ok, warn, or none if it cannot be assessed."""
 
     name: str
     label: str
@@ -49,11 +49,11 @@ class SideEffectRow:
 
 @dataclass(frozen=True)
 class Retention:
-    """The first strides of this visit against the last training strides of the one before.
+    """First strides of this visit compared with the last training strides of the previous one.
 
     Parameters
     ----------
-    verdict : in words, with the limit it follows.
+    verdict : in words, with the underlying limit.
     """
 
     session_id: str
@@ -68,7 +68,7 @@ class Retention:
 
 @dataclass(frozen=True)
 class PreviousTraining:
-    """The visit of the same training before this one."""
+    """The previous visit with the same training."""
 
     session_id: str
     performed_on: dt.date
@@ -78,7 +78,7 @@ class PreviousTraining:
 def side_effects(
     content: Prescription, baseline: Baseline, strides: Sequence[AnalysedStride], curves: CycleCurves | None
 ) -> GuardState:
-    """What changed beside the target over the take: the live guard, on the strides of the analysis."""
+    """Side effects during the trial, from the rules of the live guard applied to the analysed strides."""
     watch = GuardWatch(content, baseline)
     rows = {} if curves is None else {
         (side, i): k for side, index in curves.stride_index.items() for k, i in enumerate(index)
@@ -87,30 +87,30 @@ def side_effects(
         s = strides[i]
         if not s.counted or s.value is None:
             continue
-        found = {}
+        values = {}
         if curves is not None:
             for variable, sides in curves.curves.items():
                 row = sides[s.side][rows[s.side, i]] if s.side in sides else None
                 if row is not None and np.isfinite(row).all():
-                    found[variable] = row
-        watch.add_stride(s.side, s.value, found)
+                    values[variable] = row
+        watch.add_stride(s.side, s.value, values)
     return watch.state
 
 
 def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tuple[SideEffectRow, ...]:
-    """The other side and the sagittal profile in words."""
-    other = "other side" if content.side is None else "right" if content.side == "left" else "left"
+    """Side effects on the other side and the sagittal profile, in words."""
+    opposite = "other side" if content.side is None else "right" if content.side == "left" else "left"
     gps = Term("Sagittal profile score", "°", "", 1, (0, 20), ("larger", "smaller"))
     return (
-        _effect("other_side", f"{term.label}, {other}", guard.other, term),
+        _effect("other_side", f"{term.label}, {opposite}", guard.other, term),
         _effect("gps_sagittal_deg", "Sagittal profile score, both sides", guard.gps, gps),
     )
 
 
 def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
-        why = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
-        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {why}")
+        explanation = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
+        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {explanation}")
     text = format_signed(effect.change, term)
     if effect.limit is None:
         return SideEffectRow(
@@ -123,10 +123,10 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
 
 
 def compare_retention(
-    content: Prescription, split: FeedbackSplit, before: PreviousTraining, term: Term, limb: Limb | None
+    content: Prescription, split: FeedbackSplit, previous: PreviousTraining, term: Term, limb: Limb | None
 ) -> Retention | None:
-    """Compare the retention block with the end of the training before; None without either."""
-    now, end = split.kinds.get("retention"), before.split.end
+    """Compare the retention block with the end of the previous training; None if either is missing."""
+    now, end = split.kinds.get("retention"), previous.split.end
     if now is None or now.mean is None or end.mean is None:
         return None
     difference = now.mean - end.mean
@@ -138,8 +138,8 @@ def compare_retention(
     else:
         verdict = f"more than the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     return Retention(
-        before.session_id,
-        before.performed_on,
+        previous.session_id,
+        previous.performed_on,
         describe_summary("end", "End of the last training", False, end, digits_of(content)),
         describe_summary(
             "retention", "Start of this visit, without feedback", False, now, digits_of(content)

@@ -1,4 +1,4 @@
-"""A row of the tables of feedback: strides of one kind."""
+"""Table rows for strides with and without feedback."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NO_STRIDES: Final = "–"
 
 @dataclass(frozen=True)
 class FeedbackRow:
-    """Strides of one kind; `text` is "0.52 ± 0.03", `zone` "65 %"; "–" where there is nothing."""
+    """Strides of one kind; `text` is "0.52 ± 0.03", `zone` "65 %"; "–" if there are none."""
 
     kind: str
     label: str
@@ -28,7 +28,7 @@ class FeedbackRow:
 
 
 def describe_summary(kind: str, label: str, part: bool, s: Summary, digits: int) -> FeedbackRow:
-    """Put a summary into words."""
+    """Format a summary as text."""
     text = NO_STRIDES
     if s.mean is not None:
         spread = "" if s.sd is None else f" ± {format_number(s.sd, digits)}"
@@ -38,6 +38,6 @@ def describe_summary(kind: str, label: str, part: bool, s: Summary, digits: int)
 
 
 def format_signed(value: float, term: Term) -> str:
-    """A difference with its sign, unless it rounds to nothing."""
-    shown = format_quantity(value, term)
-    return f"+{shown}" if value > 0 and float(f"{value:.{term.digits}f}") else shown
+    """A difference with its sign, unless it rounds to zero."""
+    text = format_quantity(value, term)
+    return f"+{text}" if value > 0 and float(f"{value:.{term.digits}f}") else text

@@ -1,4 +1,4 @@
-"""A comparison of filters as its page shows it: sentences, table, charts, and the reference."""
+"""View of a filter comparison: sentences, table, charts, and reference."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from sagittal.core.frames import SEGMENTS, SIDES, SUFFIX, Floats, Side
 from sagittal.core.fusion.algorithms.listed import ENGINES
+from sagittal.core.message import Message, read_message
 from sagittal.core.plurals import plural
 from sagittal.server.report.charts.filter_charts import Over, draw_agreement, draw_spread
 from sagittal.server.report.words.filter_list import GRADES_IN_WORDS
@@ -37,7 +38,7 @@ CLEAR: Final = 1.05
 
 @dataclass(frozen=True)
 class SpreadPanel:
-    """One chart; `numbers` = side letter or "", and the RMS over the take in degrees."""
+    """One chart; `numbers` = side letter or "", and the RMS over the trial in degrees."""
 
     title: str
     svg: str
@@ -46,7 +47,7 @@ class SpreadPanel:
 
 @dataclass(frozen=True)
 class SpreadRow:
-    """A quantity of one side in the table: texts of degrees, over the take, in stance, in swing, largest."""
+    """Table row for one side of a quantity: degrees as text, over the trial, in stance, in swing, maximum."""
 
     title: str
     side: Side | None
@@ -55,7 +56,7 @@ class SpreadRow:
 
 @dataclass(frozen=True)
 class FilterRow:
-    """A filter in the table; numbers are texts, "" where there is none; told = what went wrong."""
+    """Table row of a filter; numbers are texts, "" if missing; told = error message."""
 
     name: str | None
     label: str
@@ -69,7 +70,7 @@ class FilterRow:
 
 @dataclass(frozen=True)
 class ReferenceRow:
-    """A filter against the reference in the chosen quantity: texts of degrees."""
+    """A filter compared with the reference in the selected quantity: degrees as text."""
 
     name: str | None
     label: str
@@ -79,11 +80,11 @@ class ReferenceRow:
 
 @dataclass(frozen=True)
 class ReferenceView:
-    """What is said of the reference.
+    """Comparison with the reference.
 
     Parameters
     ----------
-    choices : (value, words, chosen) of what it can be looked at for. heads : of the table's columns.
+    choices : (value, words, chosen) of available quantities. heads : column headings of the table.
     """
 
     source: str
@@ -98,7 +99,7 @@ class ReferenceView:
 
 @dataclass(frozen=True)
 class ComparisonView:
-    """Everything of the page that is of one comparison."""
+    """Content of the page for one comparison."""
 
     headline: str
     sentences: tuple[str, ...]
@@ -110,27 +111,27 @@ class ComparisonView:
 
 
 def view_comparison(
-    content: bytes, over: Over, of: str | None = None, filter_name: str | None = None
+    content: bytes, over: Over, quantity: str | None = None, filter_name: str | None = None
 ) -> ComparisonView:
-    """Read filters.json into what the page shows.
+    """View of a filters.json.
 
     Parameters
     ----------
-    of : segment or joint angle that is held against the reference. filter_name : whose plot is drawn.
+    quantity : segment or joint angle compared with the reference. filter_name : filter to plot.
     """
-    found: dict[str, Any] = json.loads(content)
-    spreads = {s["name"]: s for s in found["spreads"]}
-    end = found["t_s"][-1] if found["t_s"] else 1.0
-    has_cycles = any(s["cycle_sd"] for s in found["spreads"])
+    data: dict[str, Any] = json.loads(content)
+    spreads = {s["name"]: s for s in data["spreads"]}
+    end = data["t_s"][-1] if data["t_s"] else 1.0
+    has_cycles = any(s["cycle_sd"] for s in data["spreads"])
     over = over if has_cycles else "time"
-    ran = sum(f["to_median"] is not None for f in found["filters"]) - 1
-    rows = tuple(_row(f) for f in found["filters"])
+    ran = sum(f["to_median"] is not None for f in data["filters"]) - 1
+    rows = tuple(_row(f) for f in data["filters"])
     drawn: Mapping[str, Any] = spreads
     if ran < 2:  # a single filter is its own median: 0° everywhere, which would read as agreement
         rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
     return ComparisonView(
-        headline=_headline(spreads, ran, len(found["segments"])),
-        sentences=(*_notes(found, has_cycles), *(n["message"] for n in found["notices"])),
+        headline=_headline(spreads, ran, len(data["segments"])),
+        sentences=(*_notes(data, has_cycles), *(read_message(n) for n in data["notices"])),
         rows=rows,
         over=over,
         groups=(
@@ -141,34 +142,38 @@ def view_comparison(
             ),
         ),
         table=tuple(row for s in drawn.values() for row in _spread_rows(s)),
-        reference=None if found["reference"] is None else _reference(found, of, filter_name),
+        reference=None if data["reference"] is None else _reference(data, quantity, filter_name),
     )
 
 
 def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
-    """What the choice of a filter changes, in one sentence."""
-    filters, worn = (
+    """Effect of the choice of filter, in one sentence."""
+    filters, devices = (
         f"{n} {plural(n, word, f'{word}s')}" for n, word in ((ran, "filter"), (sensors, "sensor"))
     )
     for name, ending, words in HEADLINE:
-        found = _sides(spreads, name, ending)
-        if found and ran > 1:
-            values = " and ".join(f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in found.items())
-            return f"{filters} on {worn}: their {words} differs by {values.strip()} (standard deviation)."
+        by_side = _sides(spreads, name, ending)
+        if by_side and ran > 1:
+            values = " and ".join(
+                f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in by_side.items()
+            )
+            return f"{filters} on {devices}: their {words} differs by {values.strip()} (standard deviation)."
     if ran == 1:
-        return f"{filters} on {worn}: it has no other to differ from. It is held against Sagittal's own."
-    return f"{filters} on {worn}."
+        return f"{filters} on {devices}: it has no other to differ from. It is held against Sagittal's own."
+    return f"{filters} on {devices}."
 
 
-def _notes(found: Mapping[str, Any], has_cycles: bool) -> list[str]:
-    used = "used where a filter can" if found["magnetometer"] else "not used"
-    counted = " and ".join(f"{found['strides'].get(side, 0)} {side}" for side in SIDES)
-    cycles = f"Over the gait cycle: {counted} strides." if has_cycles else "No stride counts: over time only."
+def _notes(data: Mapping[str, Any], has_cycles: bool) -> list[str]:
+    used = "used where a filter can" if data["magnetometer"] else "not used"
+    cycle_counts = " and ".join(f"{data['strides'].get(side, 0)} {side}" for side in SIDES)
+    cycles = (
+        f"Over the gait cycle: {cycle_counts} strides." if has_cycles else "No stride counts: over time only."
+    )
     return [f"Magnetometer: {used}. {cycles}"]
 
 
 def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | None, Any]:
-    """Spreads of a quantity by side; of one that has no side under None."""
+    """Spreads of a quantity by side; None for a quantity without sides."""
     if name == "pelvis_rotation":
         name, ending = "pelvis", "_heading"
     if f"{name}{ending}" in spreads:
@@ -179,17 +184,17 @@ def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | No
 def _panels(
     quantities: Sequence[tuple[str, dict[Side | None, Any]]], over: Over, end: float
 ) -> tuple[SpreadPanel, ...]:
-    """Charts of quantities that are known, on one value axis."""
+    """Charts of the known quantities, on a common value axis."""
     drawn = []
-    for title, found in quantities:
+    for title, by_side in quantities:
         lines: dict[Side | None, Floats] = {}
-        for side, s in found.items():
+        for side, s in by_side.items():
             curves = {side: s["sd"]} if over == "time" else s["cycle_sd"]
             for key, values in curves.items():
                 lines[key] = np.array([np.nan if x is None else x for x in values])
         lines = {key: x for key, x in lines.items() if np.isfinite(x).any()}
         if lines:
-            drawn.append((title, found, lines))
+            drawn.append((title, by_side, lines))
     top = max((float(np.nanmax(x)) for _, _, lines in drawn for x in lines.values()), default=0.0)
     return tuple(
         SpreadPanel(
@@ -197,15 +202,15 @@ def _panels(
             draw_spread(title, lines, max(CLEAR * top, 0.1), end, over),
             tuple(
                 ("" if side is None else SUFFIX[side], format_number(s["rms"], 1))
-                for side, s in found.items()
+                for side, s in by_side.items()
             ),
         )
-        for title, found, lines in drawn
+        for title, by_side, lines in drawn
     )
 
 
 def _spread_rows(s: Mapping[str, Any]) -> list[SpreadRow]:
-    """One row; of what belongs to both legs one for the cycles of each."""
+    """One row per side; bilateral quantities have one for the cycles of each leg."""
     sides: list[Side | None] = list(s["stance"]) or [None]
     return [
         SpreadRow(
@@ -221,15 +226,17 @@ def _row(f: Mapping[str, Any]) -> FilterRow:
     def pair(score: Mapping[str, float] | None) -> tuple[str, str]:
         return ("", "") if score is None else (_text(score["inclination"]), _text(score["heading"]))
 
-    told = tuple(
-        f"{place_words(n['sensor']).capitalize()}: {n['message']}" if n["sensor"] else n["message"]
+    problems = tuple(
+        Message("{place}: {message}", place=place_words(n["sensor"]).capitalize(), message=read_message(n))
+        if n["sensor"]
+        else read_message(n)
         for n in f["told"]
     )
     engine = "" if f["engine"] is None else f"{f['engine']} {ENGINES[f['engine']]}"
     grade = "" if f["grade"] is None else GRADES_IN_WORDS[f["grade"]]
     cost = "" if f["cost_us"] is None else format_number(f["cost_us"], 2)
     return FilterRow(
-        f["name"], f["label"], engine, grade, cost, pair(f["to_median"]), pair(f["to_own"]), told
+        f["name"], f["label"], engine, grade, cost, pair(f["to_median"]), pair(f["to_own"]), problems
     )
 
 
@@ -237,19 +244,19 @@ def _text(value: float | None) -> str:
     return "" if value is None or not math.isfinite(value) else format_number(value, 1)
 
 
-def _reference(found: Mapping[str, Any], of: str | None, filter_name: str | None) -> ReferenceView:
-    r = found["reference"]
+def _reference(data: Mapping[str, Any], item: str | None, filter_name: str | None) -> ReferenceView:
+    r = data["reference"]
     pairs = {(b["filter"], b["quantity"]): b for b in r["agreement"]}
     scores = {(s["filter"], s["segment"]): s for s in r["scores"]}
     segments = [s for s in SEGMENTS if s in r["segments"]]
     joints = [q for q in dict.fromkeys(q for _, q in pairs) if not q.endswith(tuple(QUANTITIES))]
     names = {s: place_words(s).capitalize() for s in segments} | {q: name_quantity(q) for q in joints}
-    chosen: str = of if of is not None and of in names else next(iter(names), "")
-    labels = {f["name"]: f["label"] for f in found["filters"]}
+    chosen: str = item if item is not None and item in names else next(iter(names), "")
+    labels = {f["name"]: f["label"] for f in data["filters"]}
     is_segment = chosen in segments
     quantities = [f"{chosen}_{q}" for q in QUANTITIES] if is_segment else [chosen]
     rows = []
-    shown = filter_name if (filter_name, quantities[0]) in pairs else None
+    selected = filter_name if (filter_name, quantities[0]) in pairs else None
     for name, label in labels.items():
         errors: list[str] = []
         if is_segment:
@@ -263,11 +270,11 @@ def _reference(found: Mapping[str, Any], of: str | None, filter_name: str | None
                 ["", ""] if b is None else [_text(b["bias"]), f"{_text(b['low'])} to {_text(b['high'])}"]
             )
         if any(errors):
-            rows.append(ReferenceRow(name, label, tuple(errors), name == shown))
+            rows.append(ReferenceRow(name, label, tuple(errors), name == selected))
     figures = [
-        (q.rpartition("_")[2].capitalize() if is_segment else names[chosen], _figure(pairs[shown, q], q))
+        (q.rpartition("_")[2].capitalize() if is_segment else names[chosen], _figure(pairs[selected, q], q))
         for q in quantities
-        if (shown, q) in pairs
+        if (selected, q) in pairs
     ]
     limits = ("bias", "95 % limits")
     heads = (
@@ -277,13 +284,13 @@ def _reference(found: Mapping[str, Any], of: str | None, filter_name: str | None
     )
     return ReferenceView(
         r["source"],
-        tuple(n["message"] for n in r["notices"]),
+        tuple(read_message(n) for n in r["notices"]),
         tuple((value, words, value == chosen) for value, words in names.items()),
         names.get(chosen, ""),
         heads,
         tuple(rows),
         tuple(figures),
-        labels.get(shown, ""),
+        labels.get(selected, ""),
     )
 
 
@@ -294,7 +301,7 @@ def _figure(b: Mapping[str, Any], quantity: str) -> str:
 
 
 def name_quantity(name: str) -> str:
-    """A quantity in words: "Knee flexion, left", "Left shank, heading"."""
+    """Name of a quantity: "Knee flexion, left", "Left shank, heading"."""
     base, _, suffix = name.rpartition("_")
     if suffix in QUANTITIES:
         return f"{place_words(base).capitalize()}, {suffix}"

@@ -1,4 +1,4 @@
-"""A functional test on the session page: its total, its segments as a bar and a table, norm, last visit."""
+"""View of a functional test: total, phases as a bar and a table, norm, previous visit."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ OTHER_AGE: Final = "No norm for this age."
 
 @dataclass(frozen=True)
 class SegmentRow:
-    """A part of a test in words; `length_s` for the bar."""
+    """A phase of a test in words; `length_s` for the bar."""
 
     label: str
     start: str
@@ -81,14 +81,15 @@ class SegmentRow:
 
 @dataclass(frozen=True)
 class FunctionalView:
-    """A functional test as the page shows it.
+    """View of a functional test.
 
     Parameters
     ----------
-    name, title, unit : of the figure that stands for it. value : as printed, "–" without one; then `reason`.
-    plus_minus : what it is known to. norm : of healthy people with its source, or why there is none.
-    previous : the same figure at the visit before, as printed, "" without one.
-    start_s, end_s : of the test, None where not found. sensor : that tells. corrected : a person set them.
+    name, title, unit : main parameter. value : as printed, "–" if missing, with a `reason`.
+    plus_minus : uncertainty. norm : healthy subjects with source, or why there is none.
+    previous : value at the previous visit, as printed, "" without one.
+    start_s, end_s : of the test, None if not detected. sensor : sensor used. corrected : limits set by a
+        user.
     """
 
     name: str
@@ -108,26 +109,26 @@ class FunctionalView:
 
     @property
     def bar(self) -> str:
-        """The segments side by side as SVG, as long as they take."""
+        """The phases as a bar in SVG, with widths proportional to duration."""
         total = sum(s.length_s for s in self.segments)
         if total <= 0.0 or len(self.segments) < 2:
             return ""
-        at, shapes = 0.0, []
+        x, shapes = 0.0, []
         for i, segment in enumerate(self.segments):
             width = 1000.0 * segment.length_s / total
             wide = format_coordinate(max(width - 3.0, 1.0))
-            box = f'x="{format_coordinate(at)}" y="0" width="{wide}" height="1000"'
+            box = f'x="{format_coordinate(x)}" y="0" width="{wide}" height="1000"'
             shapes.append(f'<rect class="seg1" {box}/>' if i % 2 else f'<rect class="seg0" {box}/>')
-            at += width
-        said = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
+            x += width
+        labels = ", ".join(f"{s.label} {s.duration} s" for s in self.segments)
         return (
-            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{said}">'
+            f'<svg class="chart segbar" width="100%" height="28" role="img" aria-label="{labels}">'
             f"{stretch(''.join(shapes))}</svg>"
         )
 
-    def compare_with(self, before: Sequence[Parameter]) -> FunctionalView:
-        """The same with the figure of an earlier visit."""
-        value = next((p.mean for p in before if p.name == self.name), None)
+    def compare_with(self, earlier: Sequence[Parameter]) -> FunctionalView:
+        """The view with the value of an earlier visit."""
+        value = next((p.mean for p in earlier if p.name == self.name), None)
         if value is None:
             return self
         return replace(self, previous=format_number(value, parameter_term(self.name).digits))
@@ -136,11 +137,11 @@ class FunctionalView:
 def functional_view(
     bundle: Bundle, age: float | None = None, sex: str | None = None
 ) -> FunctionalView | None:
-    """The functional test of a finished analysis; None of any other take."""
+    """The functional test of a finished analysis; None for other trials."""
     if bundle.functional is None:
         return None
-    found = {p.name: p for p in bundle.parameters}
-    total = next((found[name] for name in TOTALS if name in found), None)
+    by_name = {p.name: p for p in bundle.parameters}
+    total = next((by_name[name] for name in TOTALS if name in by_name), None)
     if total is None:
         return None
     term, test = parameter_term(total.name), bundle.functional
@@ -170,12 +171,12 @@ def _segment(row: Mapping[str, Any]) -> SegmentRow:
 
 
 def segment_label(name: str) -> str:
-    """Words of a segment."""
+    """Label of a phase."""
     return SEGMENTS.get(name, name.replace("_", " ").capitalize())
 
 
 def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
-    """What healthy people reach in a test, with the source; else why no norm is shown."""
+    """Performance of healthy subjects in a test, with the source, or the reason why no norm is shown."""
     if name in ("walk_10m_speed_mps", "walk_6min_distance_m"):
         if age is None or sex is None:
             return NO_AGE if age is None else NO_SEX

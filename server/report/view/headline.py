@@ -1,9 +1,9 @@
-"""What stands out in a take and what changed since the visit before, in a few sentences.
+"""Findings of a trial and changes since the previous visit, in a few sentences.
 
-Every figure may speak by its distance from the norm, from the other side or from the visit before. Its size
-says how far beyond what people and measurement vary by: a figure speaks when that is above 1. Of the figures
-that tell the same thing the largest speaks (docs/science/headline.md). What is beyond the norm or the other
-side is found by server/report/view/standouts.py.
+A parameter can be compared with the norm, the other side or the previous visit. The deviation is divided by
+the combined variation between subjects and measurement error; values above 1 are findings. Of related
+parameters only the largest finding is reported (docs/science/headline.md). Deviations from the norm or the
+other side are found by server/report/view/standouts.py.
 """
 
 from __future__ import annotations
@@ -20,7 +20,16 @@ from sagittal.core.parameters.flats import OTHER
 from sagittal.core.plurals import plural
 from sagittal.server.report.view.level import from_standing
 from sagittal.server.report.words.change_words import change_words, find_term
-from sagittal.server.report.words.headline_phrases import BOTH_STEPS, PHRASES, Family
+from sagittal.server.report.words.headline_phrases import (
+    BOTH_LONGER,
+    BOTH_SHORTER,
+    CHANGED_DOWN,
+    CHANGED_UP,
+    PHRASES,
+    TRIAL_CHANGED_DOWN,
+    TRIAL_CHANGED_UP,
+    Family,
+)
 from sagittal.server.report.words.wording import format_number, parameter_term
 
 Kind = Literal["norm", "limit", "sides", "change"]
@@ -41,9 +50,9 @@ class HeadlineSentence:
 
     Parameters
     ----------
-    name : parameter that proves it. side : leg spoken of, None = both or none.
-    kind : what the figure was held against. size : how often it is beyond what varies by itself.
-    against : whom the figure was held against, in words. relevant : a change that is clinically relevant.
+    name : underlying parameter. side : leg concerned, None = both or none.
+    kind : type of comparison. size : deviation relative to normal variation.
+    against : reference group, in words. relevant : the change is clinically relevant.
     """
 
     name: str
@@ -64,13 +73,13 @@ class HeadlineSentence:
 
     @property
     def text(self) -> str:
-        """The sentence without its bold part marked."""
+        """The sentence as plain text."""
         return f"{self.before}{self.strong}{self.after}"
 
 
 @dataclass(frozen=True)
 class ChangeLeft:
-    """A real change that no sentence had room for: its figure, by how much, and the verdict in words."""
+    """A real change omitted for lack of space: parameter, difference, and assessment in words."""
 
     title: str
     side: Side | None
@@ -80,13 +89,13 @@ class ChangeLeft:
 
 @dataclass(frozen=True)
 class Headline:
-    """What a person reads first.
+    """Summary of findings and changes.
 
     Parameters
     ----------
-    badge : how many strides count, in one sentence; empty for poor data.
-    stands_out, changed : all sentences, largest first. looked_at : figures that could have spoken.
-    changes : every change since the visit before, by its verdict.
+    badge : number of included strides, in one sentence; empty for poor data.
+    stands_out, changed : all sentences, largest first. looked_at : number of parameters considered.
+    changes : all changes since the previous visit, by assessment.
     """
 
     badge: str
@@ -97,29 +106,29 @@ class Headline:
 
     @property
     def shown_changes(self) -> tuple[HeadlineSentence, ...]:
-        """Changes that have room."""
+        """Changes that fit."""
         return self.changed[: max(KEPT, MOST - len(self.stands_out))]
 
     @property
     def shown(self) -> tuple[HeadlineSentence, ...]:
-        """What stands out, as far as there is room."""
+        """Findings that fit."""
         return self.stands_out[: MOST - len(self.shown_changes)]
 
     @property
     def compared_with(self) -> str:
-        """Whom the sentences shown hold the figures against; empty without a sentence."""
-        *before, last = dict.fromkeys(s.against for s in self.shown) or ("",)
-        said = f"{', '.join(before)} and {last}" if before else last
-        return f"against {said}" if said else ""
+        """Reference groups of the displayed sentences; empty without any."""
+        *groups, last = dict.fromkeys(s.against for s in self.shown) or ("",)
+        groups_text = f"{', '.join(groups)} and {last}" if groups else last
+        return f"against {groups_text}" if groups_text else ""
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Rank of the sentence by the name of its figure; printed at the row of that name."""
+        """Rank of sentences by parameter name, printed in the row of that parameter."""
         return {s.name: rank for rank, s in enumerate(self.shown, 1)}
 
     @property
     def curve_ranks(self) -> dict[str, tuple[int, ...]]:
-        """Ranks of the sentences about figures of a cycle curve, by its variable; printed at its chart."""
+        """Ranks of sentences about cycle curves, by variable, printed with the chart."""
         ranks: dict[str, tuple[int, ...]] = {}
         for name, rank in self.ranks.items():
             entry = find_entry(from_standing(name) or name)
@@ -129,13 +138,13 @@ class Headline:
 
     @property
     def standouts_left(self) -> tuple[str, ...]:
-        """Labels of what stands out and has no room."""
+        """Labels of findings that do not fit."""
         left = self.stands_out[len(self.shown) :]
         return tuple(dict.fromkeys(parameter_term(from_standing(s.name) or s.name).label for s in left))
 
     @property
     def changes_left(self) -> tuple[ChangeLeft, ...]:
-        """Real changes that no sentence shown tells."""
+        """Real changes not covered by a displayed sentence."""
         return tuple(
             ChangeLeft(
                 find_term(c.name, c.unit).label,
@@ -150,7 +159,7 @@ class Headline:
 
 
 def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
-    """Whether a sentence says a changed fact; one without a side speaks of both."""
+    """Whether a sentence covers a change; a sentence without a side covers both."""
     return any(
         sentence.name == c.name
         and (sentence.side is None or name_fact(c.name, sentence.side) == name_fact(c.name, c.side))
@@ -159,26 +168,26 @@ def _tells(sentence: HeadlineSentence, fact: ChangedFact) -> bool:
 
 
 def say_badge(kind: str, strides: Strides) -> str:
-    """How many strides count, in one sentence; empty for data that are not good enough to count them.
+    """Number of included strides, in one sentence; empty for poor data.
 
     Parameters
     ----------
-    kind : ok, warn or bad, of the data as a whole.
+    kind : overall data quality, ok, warn or bad.
     """
     if kind == "bad":
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    counted = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
+    count_text = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
     if min(left, right) < COMPARED and strides.strides:
-        return f"{counted}: fewer than {COMPARED} of a side are compared with nobody."
+        return f"{count_text}: fewer than {COMPARED} of a side are compared with nobody."
     if not strides.strides:
         return "Steps are told by the trunk; sides are not compared."
-    return f"{counted}."
+    return f"{count_text}."
 
 
 def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
-    """Sentences on the real changes: what is clinically relevant first, then the largest."""
+    """Sentences about real changes: clinically relevant ones first, then the largest."""
     real: dict[str, list[tuple[Change, float]]] = {}
     relevant: set[str] = set()
     for fact in changes.real:
@@ -186,18 +195,18 @@ def find_changes(changes: SortedChanges) -> tuple[HeadlineSentence, ...]:
         if c is not None and c.difference is not None and c.limit:
             real.setdefault(c.name, []).append((c, min(abs(c.difference) / c.limit, LARGEST)))
             relevant |= {c.name} if fact.relevant else set()
-    found = [s for group in real.values() for s in _of_change(group)]
-    return take_largest([replace(s, relevant=s.name in relevant) for s in found])
+    sentences = [s for group in real.values() for s in _of_change(group)]
+    return take_largest([replace(s, relevant=s.name in relevant) for s in sentences])
 
 
-def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
-    """Of each family the sentence that says most: what is relevant first, then the largest."""
+def take_largest(sentences: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, ...]:
+    """The most important sentence of each family: relevant ones first, then the largest."""
     order = {name: i for i, name in enumerate(PHRASES)}
 
     def place(s: HeadlineSentence) -> tuple[bool, float, int]:
         return not s.relevant, -s.size, order.get(from_standing(s.name) or s.name, len(order))
 
-    ranked = sorted(found, key=place)
+    ranked = sorted(sentences, key=place)
     largest: dict[str, HeadlineSentence] = {}
     for s in ranked:
         largest.setdefault(s.family, s)
@@ -205,26 +214,25 @@ def take_largest(found: Sequence[HeadlineSentence]) -> tuple[HeadlineSentence, .
 
 
 def _of_change(group: Sequence[tuple[Change, float]]) -> Iterator[HeadlineSentence]:
-    """One sentence of the sides of a figure that changed."""
+    """One sentence for the sides of a parameter that changed."""
     worst, size = max(group, key=lambda pair: pair[1])
-    p, by = PHRASES[worst.name], worst.difference or 0.0
+    p, change = PHRASES[worst.name], worst.difference or 0.0
     sides = {c.side: c.difference or 0.0 for c, _ in group}
     if worst.name == "step_length_m" and set(sides) == set(SIDES) and sides["left"] * sides["right"] > 0.0:
         digits = parameter_term(worst.name).digits
-        words = {
-            "word": "longer" if by > 0 else "shorter",
-            "l": format_number(abs(sides["left"]), digits),
-            "r": format_number(abs(sides["right"]), digits),
-        }
-        yield make_sentence(worst.name, p.family, "change", size, BOTH_STEPS, words, None)
+        lengths = {side[0]: format_number(abs(sides[side]), digits) for side in SIDES}
+        both = BOTH_LONGER if change > 0 else BOTH_SHORTER
+        yield make_sentence(worst.name, p.family, "change", size, both, lengths, None)
         return
-    pattern = p.up if by > 0 else p.down
-    if pattern:
-        words = {
-            "d": format_number(abs(by), choose_digits(worst.name)),
-            "cm": format_number(100.0 * abs(by), 0),
-        }
-        yield make_sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
+    words = {
+        "noun": p.noun,
+        "d": format_amount(worst.name, abs(change)),
+        "before": format_amount(worst.name, p.sign * (worst.before or 0.0)),
+        "after": format_amount(worst.name, p.sign * (worst.after or 0.0)),
+    }
+    patterns = (TRIAL_CHANGED_DOWN, TRIAL_CHANGED_UP) if worst.side is None else (CHANGED_DOWN, CHANGED_UP)
+    pattern = patterns[p.sign * change > 0.0]
+    yield make_sentence(worst.name, p.family, "change", size, pattern, words, worst.side)
 
 
 def make_sentence(
@@ -237,14 +245,28 @@ def make_sentence(
     side: Side | None,
     people: str = "",
 ) -> HeadlineSentence:
-    """Make a sentence of a pattern, its bold part between asterisks; sizes are cut at LARGEST."""
+    """Create a sentence from a pattern with its bold part between asterisks; sizes are capped at LARGEST."""
     against = people or {"sides": "the other side", "limit": "limits"}.get(kind, "")
     legs = {} if side is None else {"side": side, "other": OTHER[side]}
-    before, strong, after = pattern.format(**words, **legs).split("*")
-    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), before, strong, after, against)
+    head, strong, tail = pattern.format(**words, **legs).split("*")
+    return HeadlineSentence(name, side, family, kind, min(size, LARGEST), head, strong, tail, against)
 
 
 def choose_digits(name: str) -> int:
-    """Degrees and steps a minute whole, shares to a tenth, metres and seconds to a hundredth."""
+    """Decimals: none for degrees and steps/min, one for percentages, two for metres and seconds."""
     term = parameter_term(name)
     return {"°": 0, "steps/min": 0, "%": 1}.get(term.unit, 2)
+
+
+def format_amount(name: str, value: float, *, unit: bool = True) -> str:
+    """Format a value with its unit as findings print it; circumduction is in centimetres.
+
+    >>> format_amount("knee_flexion_rom_deg", -3.6), format_amount("circumduction_m", 0.124)
+    ('−4°', '12\u202fcm')
+    """
+    printed = parameter_term(from_standing(name) or name).unit
+    if name == "circumduction_m":
+        text, printed = format_number(100.0 * value, 0), "cm"
+    else:
+        text = format_number(value, choose_digits(from_standing(name) or name))
+    return text if not unit else f"{text}°" if printed == "°" else f"{text}\u202f{printed}"

@@ -1,4 +1,4 @@
-"""Large numbers of the overview: which figures they are, and each with its meaning in words."""
+"""Key numbers of the overview, each with an explanation."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ SHOWN_LARGE: Final = 4
 
 @dataclass(frozen=True)
 class KeyNumber:
-    """One large number, or a left-right pair, with its meaning in words."""
+    """One key number, or a left-right pair, with an explanation."""
 
     name: str
     title: str
@@ -48,9 +48,11 @@ class KeyNumber:
 
 
 def choose_key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
-    """The first of KEY_NUMBERS that were measured well enough."""
-    found = (r for name in KEY_NUMBERS for r in rows if r.name == name)
-    return tuple(_key_number(r) for r in found if r.reason is None and not r.low_confidence)[:SHOWN_LARGE]
+    """The first of KEY_NUMBERS that were measured reliably."""
+    candidates = (r for name in KEY_NUMBERS for r in rows if r.name == name)
+    return tuple(_key_number(r) for r in candidates if r.reason is None and not r.low_confidence)[
+        :SHOWN_LARGE
+    ]
 
 
 def _key_number(row: ParameterRow) -> KeyNumber:
@@ -71,11 +73,11 @@ def _key_number(row: ParameterRow) -> KeyNumber:
 
 
 def say_plus_minus(row: ParameterRow) -> str:
-    """What the numbers are known to: "± 0.02", of two sides "± 4 | 5" where they differ, "± 4 | –" of one."""
+    """Uncertainty: "± 0.02", "± 4 | 5" if it differs between sides, "± 4 | –" for one side."""
     cells = (row.both,) if row.both is not None else (row.left, row.right)
-    found = ["" if c is None else c.plus_minus for c in cells]
-    if not any(found):
+    texts = ["" if c is None else c.plus_minus for c in cells]
+    if not any(texts):
         return ""
-    if len(set(found)) == 1:
-        return found[0]
-    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in found)}"
+    if len(set(texts)) == 1:
+        return texts[0]
+    return f"± {' | '.join(x.removeprefix('± ') or '–' for x in texts)}"

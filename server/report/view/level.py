@@ -1,4 +1,4 @@
-"""Angles from the anatomical zero: rows beside those from standing, where a goniometer was used."""
+"""Angles relative to the anatomical zero, if measured by goniometer, in addition to standing."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _SUFFIX: Final = "_anatomical_deg"
 
 
 def from_standing(name: str) -> str | None:
-    """Name of the same figure from standing; None for any other row."""
+    """Name of the same parameter relative to standing; None for other rows."""
     return f"{name.removesuffix(_SUFFIX)}_deg" if name.endswith(_SUFFIX) else None
 
 
 def define_parameter(name: str) -> str:
-    """What a figure is, in a sentence, "" where the catalogue has none; from the anatomical zero too."""
+    """Definition of a parameter, "" if not in the catalogue; also for the anatomical zero."""
     entry = find_entry(from_standing(name) or name)
     if entry is None or from_standing(name) is None:
         return "" if entry is None else entry.definition
@@ -42,7 +42,7 @@ def define_parameter(name: str) -> str:
 
 
 def label_parameter(name: str) -> str:
-    """What a figure is called, the name itself where the catalogue has none; a level says its zero."""
+    """Label of a parameter, or its name if not in the catalogue; angles include their zero."""
     standing = from_standing(name)
     entry = find_entry(standing or name)
     if entry is None:
@@ -53,7 +53,7 @@ def label_parameter(name: str) -> str:
 def level_column(
     name: str, strides: Strides, columns: Mapping[str, Column], standing_deg: Mapping[str, float]
 ) -> Column | None:
-    """The figure of every stride from the anatomical zero: that from standing plus what was read."""
+    """Values of all strides relative to the anatomical zero, by adding the goniometer reading."""
     column = columns.get(from_standing(name) or "")
     if column is None:
         return None
@@ -72,14 +72,14 @@ def level_column(
 def level_parameters(
     curves: CycleCurves, standing_deg: Mapping[str, float], estimated: Collection[str] = ()
 ) -> tuple[Parameter, ...]:
-    """Figures of the variables and sides whose standing angle was entered, named "…_anatomical_deg".
+    """Parameters of variables and sides with a goniometer reading, named "…_anatomical_deg".
 
     Parameters
     ----------
-    estimated : variables that no two sensors measure; a goniometer does not help them.
+    estimated : variables estimated by a model, for which a goniometer reading is not used.
     """
-    found = _measured_parameters(curves, standing_deg, estimated)
-    return tuple(replace(p, name=_level_name(p.name)) for p in found)
+    measured = _measured_parameters(curves, standing_deg, estimated)
+    return tuple(replace(p, name=_level_name(p.name)) for p in measured)
 
 
 def level_rows(
@@ -92,22 +92,22 @@ def level_rows(
 
     Parameters
     ----------
-    norms : of this person, looked up with `anatomical` = the variables of `anatomical_variables`.
+    norms : for the patient, looked up with `anatomical` = the variables of `anatomical_variables`.
     """
-    found = _measured_parameters(curves, standing_deg, estimated)
-    rows = parameter_rows(found, norms, zero="anatomical")
+    measured = _measured_parameters(curves, standing_deg, estimated)
+    rows = parameter_rows(measured, norms, zero="anatomical")
     return tuple(replace(row, name=_level_name(row.name), group=GROUP) for row in rows)
 
 
 def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tuple[ParameterRow, ...]:
-    """Rows of a page: every joint angle once, measured from the zero of its curve.
+    """Rows of a page: every joint angle once, with the zero of its curve.
 
     Parameters
     ----------
-    anatomical : variables whose curves are drawn from the anatomical zero.
+    anatomical : variables with curves relative to the anatomical zero.
     """
-    given = tuple(rows)
-    names = {row.name for row in given}
+    all_rows = tuple(rows)
+    names = {row.name for row in all_rows}
 
     def is_of_page(row: ParameterRow) -> bool:
         entry = find_entry(from_standing(row.name) or row.name)
@@ -116,7 +116,7 @@ def choose_zero(rows: Iterable[ParameterRow], anatomical: Collection[str]) -> tu
             return is_anatomical
         return not (is_anatomical and _level_name(row.name) in names)
 
-    return tuple(row for row in given if is_of_page(row))
+    return tuple(row for row in all_rows if is_of_page(row))
 
 
 def _measured_parameters(

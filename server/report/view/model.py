@@ -1,4 +1,4 @@
-"""Bundle + norms → what a page, a print or an API client shows: degrees and words, no arrays of signals.
+"""Report model of pages, print and API: bundle and norms to degrees and words, without signals.
 
 A pure function of stored results (law 10): under 50 ms for a 10 min session.
 """
@@ -58,7 +58,7 @@ _KINDS: Final = {"error": "bad", "warning": "warn", "info": "info"}
 
 @dataclass(frozen=True)
 class ReportWarning:
-    """A notice for the reader: `kind` is bad, warn or info."""
+    """A notice for users: `kind` is bad, warn or info."""
 
     kind: str
     code: str
@@ -70,7 +70,7 @@ class ReportWarning:
 
 @dataclass(frozen=True)
 class StrideRow:
-    """A stride of the list; `excluded` says in words why it does not count."""
+    """A stride of the list; `excluded` is the reason for exclusion in words."""
 
     side: Side
     start_s: float
@@ -82,7 +82,7 @@ class StrideRow:
 
 @dataclass(frozen=True)
 class PreviousVisit:
-    """The visit before this one that its table is compared with."""
+    """The previous visit, with which the table is compared."""
 
     session_id: str
     performed_on: dt.date
@@ -90,22 +90,22 @@ class PreviousVisit:
 
 @dataclass(frozen=True, eq=False)
 class ReportModel:
-    """Everything a session page shows.
+    """Content of the session pages.
 
     Parameters
     ----------
-    problem : what stopped the analysis, None when it ran to its end.
-    estimator : which pose estimator ran and its health, None when it was not reached.
-    limits : values against limits, None where no stride counts.
+    problem : error that stopped the analysis, None if complete.
+    estimator : pose estimator and its health, None if not reached.
+    limits : values against limits, None without included strides.
     profile : distance of the curves from healthy adults, None without curves.
     groups : parameter rows under their headings. key_curve : the panel shown on the overview.
-    norm_note : source, number and speed of the reference people, or why there is none.
-    curve_notes : how to read the curves, in sentences: zero, offsets, confidence, what is drawn.
-    since : the visit that `change` of the rows refers to, None without an earlier one walked alike.
-    condition : how the take was walked, in words.
-    squats : of a take of squats, None of any other. functional : of a functional test, likewise.
-    daily : of a take of daily life, None of any other.
-    headline : what stands out and what changed, in sentences; None where there is no walk to speak of.
+    norm_note : source, size and speed of the reference group, or why there is none.
+    curve_notes : explanations of the curves: zero, offsets, confidence, elements.
+    since : the visit that `change` of the rows refers to, None without a comparable earlier one.
+    condition : walking condition, in words.
+    squats : of squats, otherwise None. functional : of a functional test, likewise.
+    daily : of a daily-life recording, otherwise None.
+    headline : findings and changes, in sentences; None if there is no walk.
     """
 
     problem: str | None
@@ -139,31 +139,31 @@ class ReportModel:
 
     @property
     def page_groups(self) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
-        """The groups as a page shows them: every joint angle once, measured from the zero of its curve."""
+        """The groups for a page: every joint angle once, with the zero of its curve."""
         rows = (row for _, group in self.groups for row in group)
         return group_rows(choose_zero(rows, _list_anatomical(self.panels)))
 
     @property
     def has_sides(self) -> bool:
-        """The table has columns of left and right: all but a test of which no value is of one side."""
+        """Whether the table has columns for left and right; only a test may lack values of one side."""
         rows = [row for _, group in self.groups for row in group]
         return self.functional is None or any(row.left or row.right for row in rows)
 
     @property
     def at_speed(self) -> bool:
-        """A band is of people at the person's speed, the line beside it of people at their own."""
+        """Whether bands are norms at the patient's speed, with lines for norms at comfortable speed."""
         return any(p.comfortable is not None for p in self.panels)
 
     @property
     def used(self) -> dict[Side, int]:
-        """Strides that count, by side."""
+        """Number of included strides, by side."""
         return {side: sum(s.used for s in self.strides if s.side == side) for side in SIDES}
 
     @property
     def replay(self) -> dict[str, object]:
-        """What the clock of the page needs: duration, strides, mean curves by variable and side (deg).
+        """Data for the page's clock: duration, strides, mean curves by variable and side (deg).
 
-        Of squats these take the place of strides.
+        For squats these replace strides.
         """
         if self.squats is not None:
             means = self.squats.means_deg
@@ -172,7 +172,8 @@ class ReportModel:
                 "called": "squat",
                 "strides": [asdict(span) for span in self.squats.spans],
                 "curves": {
-                    name: {side: round_curve(mean) for side, mean in of.items()} for name, of in means.items()
+                    name: {side: round_curve(mean) for side, mean in by_side.items()}
+                    for name, by_side in means.items()
                 },
             }
         return {
@@ -187,7 +188,7 @@ class ReportModel:
         }
 
     def to_json(self) -> dict[str, object]:
-        """Plain JSON; single strides are left to curves.csv and angles.parquet."""
+        """JSON types, without single strides (see curves.csv and angles.parquet)."""
         result = reduce_to_plain(
             {
                 "problem": self.problem,
@@ -232,10 +233,10 @@ def report_model(
 
     Parameters
     ----------
-    age : years at the visit; without it curves are compared with all adults, timing with nobody.
-    speed_mps : walking speed, None = the take's own. treadmill : it was walked on a belt.
-    height_m : makes the speed dimensionless, so that legs of any length find their reference.
-    affected : side, None = none or both. controls : the clinic's own, where no published norm compares.
+    age : years at the visit; if missing, curves are compared with all adults, and timing is not compared.
+    speed_mps : gait speed, None = from the trial. treadmill : walked on a treadmill.
+    height_m : used for dimensionless speed, so that norms match any leg length.
+    affected : side, None = none or both. controls : the clinic's own, used if no published norm applies.
     """
     if speed_mps is None:
         speed_mps = next((p.mean for p in bundle.parameters if p.name == "gait_speed_mps"), None)
@@ -279,19 +280,19 @@ def report_model(
 
 
 def _add_own_norms(norms: Norms, own: Norms) -> Norms:
-    """The clinic's own norms, where no published one compares."""
+    """Add the clinic's own norms where no published one applies."""
     compared = {name: v for name, v in norms.values.items() if v.comparable or name not in own.values}
     return replace(norms, values={**own.values, **compared})
 
 
 def _find_problem(bundle: Bundle) -> str | None:
-    """What stopped the analysis, in words."""
+    """Error that stopped the analysis, in words."""
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     return None if stopped is None else speak_places(stopped)
 
 
 def _zero_offsets(bundle: Bundle) -> dict[str, float]:
-    """What was subtracted from every angle that there is, in degrees."""
+    """Offsets subtracted from all available angles, in degrees."""
     angles = bundle.angles
     if angles is None:
         return {}
@@ -299,23 +300,23 @@ def _zero_offsets(bundle: Bundle) -> dict[str, float]:
 
 
 def _is_told_by_trunk(bundle: Bundle) -> bool:
-    """Whether this is a functional test without a sensor that gives strides."""
+    """Whether this is a functional test without a sensor suitable for strides."""
     return bundle.functional is not None and not bundle.strides.strides
 
 
 def _mark_unsure(bundle: Bundle) -> tuple[Parameter, ...]:
-    """The parameters; those that a model of the leg gives, or that squats give unsurely, say so."""
+    """Mark parameters that are estimated by a leg model or uncertain in squats."""
     marked = mark_estimated(bundle.parameters, list_estimated_angles(bundle.estimator))
     return tuple(replace(p, estimated=True) if p.name.startswith(UNSURE_FIGURES) else p for p in marked)
 
 
 def _stride_row(s: Stride) -> StrideRow:
-    why = None if s.excluded_reason is None else explain_exclusion(s.excluded_reason)
-    return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, why)
+    reason = None if s.excluded_reason is None else explain_exclusion(s.excluded_reason)
+    return StrideRow(s.side, s.start_s, s.tc_s, s.end_s, s.excluded_reason is None, reason)
 
 
 def _profile(bundle: Bundle, curves: CycleCurves, age: float | None, norms: Norms) -> ProfileView | None:
-    """Scores against all adults of this age, and against those at this speed where there are any."""
+    """Scores against all adults of this age, and against those at this speed if available."""
     matched = adult_reference_at_speed(age, norms.speed)
     at_speed = None if matched is None else _scores(bundle, curves, age, matched)
     return profile_view(_scores(bundle, curves, age), at_speed)
@@ -340,7 +341,7 @@ def _judge_limits(
     age: float | None,
     own: Norms | None,
 ) -> tuple[Flag, ...]:
-    """Values against limits, none where no stride counts. Estimated angles are not held against anything."""
+    """Compare values with limits, empty without included strides. Estimated angles are excluded."""
     if not bundle.strides.select_used():
         return ()
     unsure = list_estimated_variables(bundle.estimator)
@@ -358,7 +359,7 @@ def _headline(
     norms: Norms,
     flags: Sequence[Flag],
 ) -> Headline | None:
-    """Poor data say nothing of the person: then the badge alone speaks. None where there is no walk."""
+    """Headline; only the badge for poor data, None without a walk."""
     if bundle.repetitions is not None or bundle.activity is not None or _is_told_by_trunk(bundle):
         return None
     badge = say_badge(quality.kind, bundle.strides)
@@ -375,7 +376,7 @@ def _duration(bundle: Bundle) -> float:
 
 
 def _norm_note(bundle: Bundle) -> str | None:
-    """What is said where nobody has a norm for the movement, None of walking."""
+    """Note for movements without a norm, None for walking."""
     if _is_told_by_trunk(bundle):
         return TEST_NORM_NOTE
     if bundle.activity is not None:
@@ -385,11 +386,11 @@ def _norm_note(bundle: Bundle) -> str | None:
 
 def _warning(n: Notice) -> ReportWarning:
     title = n.code.replace("_", " ").capitalize()
-    where = "" if n.sensor is None else f", {place_words(n.sensor)}"
+    location = "" if n.sensor is None else f", {place_words(n.sensor)}"
     return ReportWarning(
         kind=_KINDS[n.severity],
         code=n.code,
-        title=f"{title}{where}",
+        title=f"{title}{location}",
         message=speak_places(n.message),
         sensor=n.sensor,
         t_s=n.t_s,

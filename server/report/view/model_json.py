@@ -1,4 +1,4 @@
-"""Curves and profile of a report as the API gives them: renamed members, degrees to 0.01, no drawings."""
+"""JSON of a report's curves and profile for the API: renamed fields, degrees rounded to 0.01, no drawings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sagittal.server.report.view.profile import ProfileView
 
 
 def round_curve(values: Floats | None) -> list[float | None] | None:
-    """A curve for the wire, to 0.01°; None where it has no value."""
+    """A curve rounded to 0.01°; None where it has no value."""
     if values is None:
         return None
     return [x if np.isfinite(x) else None for x in np.round(values, 2).tolist()]
@@ -26,7 +26,7 @@ def profile_json(profile: ProfileView) -> dict[str, object]:
 
 
 def panel_json(p: CurvePanel) -> dict[str, object]:
-    """A panel of curves; of the variable what a reader of the numbers needs."""
+    """A panel of curves, with the relevant attributes of its variable."""
     v = p.variable
     return {
         "variable": v.name,

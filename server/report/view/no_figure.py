@@ -1,4 +1,4 @@
-"""Why an analysis that is done has no figure: another run will not bring one, so the reason is said."""
+"""Reasons why a finished analysis has no avatar, which a repeated analysis would not change."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ OF_DAYS: Final = "of daily life only what was done, and when, is measured."
 
 
 def explain_no_figure(bundle: Bundle) -> str:
-    """Say in a sentence why an analysis without poses has none: it stopped, its protocol, or its sensors."""
+    """Reason in one sentence why an analysis has no poses: it stopped, its protocol, or its sensors."""
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     if stopped is not None:
         return f"This take has no figure: the analysis stopped before it. {speak_places(stopped)}"

@@ -1,4 +1,4 @@
-"""What must be said beside tables and curves: who the norm's people are, what the zero is."""
+"""Notes on tables and curves: reference groups and zeros."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def norm_note(
     norms: Norms,
     controls: ControlGroup | None = None,
 ) -> str:
-    """Who the reference people are, or why there are none; always something."""
+    """Reference group, or the reason why there is none; never empty."""
     sentences = []
     if norms.reason is not None:
         sentences.append(NO_NORM.get(norms.reason, norms.reason))
@@ -38,14 +38,14 @@ def norm_note(
     bands = norms.comfortable_bands if matched else norms.bands
     band = next(iter(bands.values()), None)
     if band is not None and angles:
-        who = GROUPS.get(band.group, band.group)
+        group = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"{'Comfortable' if matched else 'Norm'}: {band.n} {who}, overground at their comfortable "
+            f"{'Comfortable' if matched else 'Norm'}: {band.n} {group}, overground at their comfortable "
             f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
-    elif shown := [
+    elif displayed := [
         r
         for r in rows
         if r.norm is not None
@@ -54,7 +54,7 @@ def norm_note(
         and not is_angle(r.name)
         and r.unit != "°"
     ]:
-        sentences.append(f"Timing: {norms.values[shown[0].name].group} ({shown[0].norm_source}).")
+        sentences.append(f"Timing: {norms.values[displayed[0].name].group} ({displayed[0].norm_source}).")
     if any(r.norm_note == FEW_NOTE for r in rows):
         sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
@@ -66,16 +66,16 @@ def norm_note(
 
 
 def _matched_note(norms: Norms) -> str:
-    """Who was asked to walk at this speed, and what they are not."""
-    at = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
+    """Reference group that was asked to walk at this speed, and its limitations."""
+    speed = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
     return (
-        f"Norm: {ASKED}{at}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from habit "
-        "or age."
+        f"Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from "
+        "habit or age."
     )
 
 
 def _own_note(controls: ControlGroup) -> str:
-    """Who the clinic's own controls are, or that they are too few."""
+    """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
         return f"Own controls who walk as fast: {controls.n}, too few to compare with."
     small = ", a small group" if controls.note == "small_group" else ""
@@ -83,7 +83,7 @@ def _own_note(controls: ControlGroup) -> str:
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
-    """How to read the curves, in sentences: zero, offsets, confidence, what is drawn."""
+    """Explanations of the curves, in sentences: zero, offsets, confidence, elements."""
     if bundle.angles is None:
         return ()
     labels = {v.name: v.label.lower() for v in VARIABLES if v.plane == "sagittal"}
@@ -128,18 +128,18 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
 
 
 def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
-    """Which curves have no value at some of their points."""
+    """Curves without a value at some points."""
     broken = [
         p.variable.label
         for p in panels
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
-    why = "interrupted where the leg model's knee rests on its limit in most strides"
-    return [f"{', '.join(broken).capitalize()}: {why}; nothing is measured there."] if broken else []
+    reason = "interrupted where the leg model's knee rests on its limit in most strides"
+    return [f"{', '.join(broken).capitalize()}: {reason}; nothing is measured there."] if broken else []
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:
-    """What must be said about the norm, once for all variables it concerns."""
+    """Notes on norms, each once for all variables concerned."""
     concerned: dict[str, list[str]] = {}
     for p in panels:
         if p.norm_note and p.reason is None:

@@ -1,4 +1,4 @@
-"""The movement analysis profile: how far each curve is from healthy adults.
+"""Movement analysis profile: distance of each curve from healthy adults.
 
 docs/science/norms-and-scores.md, "GVS and GPS".
 """
@@ -49,9 +49,8 @@ class ProfileRow:
 
     Parameters
     ----------
-    left, right, healthy, svg : against people at the person's speed where `ProfileView.at_speed`.
-    comfortable_left, comfortable_right : against people at their comfortable speed, "" where the above are
-        against these already.
+    left, right, healthy, svg : against subjects at the patient's speed if `ProfileView.at_speed`.
+    comfortable_left, comfortable_right : against subjects at comfortable speed, "" if the above already are.
     """
 
     title: str
@@ -67,7 +66,7 @@ class ProfileRow:
 
 @dataclass(frozen=True)
 class ProfileBar:
-    """A row in numbers, degrees: of each side with a value, and of healthy people where known."""
+    """A row as numbers, degrees: of each side with a value, and of healthy subjects if known."""
 
     title: str
     values: Mapping[Side, float]
@@ -77,14 +76,14 @@ class ProfileBar:
 
 @dataclass(frozen=True)
 class ProfileView:
-    """Rows of the profile, GDI* in words, what it leaves out, and who the reference people are.
+    """Rows of the profile, GDI* in words, its limitations, and the reference group.
 
     Parameters
     ----------
-    at_speed : the reference people were asked to walk at the person's speed.
-    bars : of the curves with high confidence. score : the sagittal profile score over them, levels removed,
-        from people at their comfortable speed, as over the visits; None where too many curves miss.
-    score_at_speed : the same from people at the person's speed, None where nobody walked so.
+    at_speed : the reference group was asked to walk at the patient's speed.
+    bars : of the curves with high confidence. score : sagittal profile score over them, with offsets removed,
+        against subjects at comfortable speed, as in trends; None if too many curves are missing.
+    score_at_speed : the score against subjects at the patient's speed, None if unavailable.
     """
 
     rows: tuple[ProfileRow, ...]
@@ -97,29 +96,29 @@ class ProfileView:
 
 
 def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileView | None:
-    """None when no curve could be scored.
+    """View of a profile; None if no curve could be scored.
 
     Parameters
     ----------
-    comfortable, matched : scores of the same curves, against people at their comfortable speed and at the
-        person's own; None where nobody walked so.
+    comfortable, matched : scores of the same curves, against subjects at comfortable speed and at the
+        patient's speed; None if unavailable.
     """
     scores = comfortable if matched is None else matched
     rows, bars = [], []
     for variable in dict.fromkeys(s.variable for s in scores.scores if s.variable is not None):
-        found = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
-        if any(s.value is not None for s in found.values()):
+        side_scores = {side: scores.find("gvs_deg", MODE, side, variable) for side in SIDES}
+        if any(s.value is not None for s in side_scores.values()):
             label, plane = LABELS.get(variable, variable), PLANES.get(variable)
-            row = _row(label, found, low=plane != "sagittal", total=False)
+            row = _row(label, side_scores, low=plane != "sagittal", total=False)
             rows.append(_beside(row, comfortable, scores, "gvs_deg", MODE, variable))
             if plane == "sagittal":
-                bars.append(_numbers(label, found))
+                bars.append(_numbers(label, side_scores))
     if not rows:
         return None
     for name, mode, title in TOTALS:
-        both = {side: scores.find(name, mode, side) for side in SIDES}
-        if any(s.value is not None for s in both.values()):
-            row = _row(title, both, low=name == "gps_deg", total=True)
+        by_side = {side: scores.find(name, mode, side) for side in SIDES}
+        if any(s.value is not None for s in by_side.values()):
+            row = _row(title, by_side, low=name == "gps_deg", total=True)
             rows.append(_beside(row, comfortable, scores, name, mode))
     return ProfileView(
         tuple(rows),
@@ -133,16 +132,16 @@ def profile_view(comfortable: Scores, matched: Scores | None = None) -> ProfileV
 
 
 def _total(scores: Scores) -> ProfileBar | None:
-    found = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
-    total = _numbers(SCORE_TERMS["gps_sagittal_deg"].label, found)
+    by_side = {side: scores.find("gps_sagittal_deg", MODE, side) for side in SIDES}
+    total = _numbers(SCORE_TERMS["gps_sagittal_deg"].label, by_side)
     return total if total.values else None
 
 
-def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
-    """Draw both sides of a bar over each other, left filled, right outlined; a tick at the visit before.
+def bar_svg(bar: ProfileBar, previous: ProfileBar | None, height: int = BAR_HEIGHT) -> str:
+    """Draw the bars of both sides, left filled, right outlined, with a tick at the previous visit.
 
-    Solid line: the middle of healthy people; dashed: 95 of 100 are below. A longer bar is cut at BARS_DEG.
-    `height` in px.
+    Solid line: median of healthy subjects; dashed: 95th percentile. Bars are clipped at BARS_DEG. `height` in
+    px.
     """
 
     def x(value: float) -> str:
@@ -154,11 +153,11 @@ def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT
         value = bar.values.get(cast("Side", side))
         if value is not None:
             shapes.append(f'<rect class="{css}" x="0" y="{y:.1f}" width="{x(value)}" height="{thick:.1f}"/>')
-        earlier = None if before is None else before.values.get(cast("Side", side))
+        earlier = None if previous is None else previous.values.get(cast("Side", side))
         if earlier is not None:
-            at = x(earlier)
+            x_earlier = x(earlier)
             ends = f'y1="{y - 0.07 * height:.1f}" y2="{y + 0.36 * height:.1f}"'
-            shapes.append(f'<line class="mapb" x1="{at}" x2="{at}" {ends}/>')
+            shapes.append(f'<line class="mapb" x1="{x_earlier}" x2="{x_earlier}" {ends}/>')
     for css, end in (("mapm", bar.median), ("map95", bar.p95)):
         if end is not None:
             shapes.append(f'<line class="{css}" x1="{x(end)}" x2="{x(end)}" y1="0" y2="{height}"/>')
@@ -166,34 +165,34 @@ def bar_svg(bar: ProfileBar, before: ProfileBar | None, height: int = BAR_HEIGHT
     return f'<svg class="chart mapbar" width="100%" height="{height}" aria-hidden="true">{drawn}</svg>'
 
 
-def _numbers(title: str, found: Mapping[Side, Score]) -> ProfileBar:
-    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
+def _numbers(title: str, by_side: Mapping[Side, Score]) -> ProfileBar:
+    healthy = next((s.healthy for s in by_side.values() if s.healthy is not None), None)
     return ProfileBar(
         title,
-        {side: s.value for side, s in found.items() if s.value is not None},
+        {side: s.value for side, s in by_side.items() if s.value is not None},
         None if healthy is None else healthy.median_deg,
         None if healthy is None else healthy.p95_deg,
     )
 
 
 def _beside(
-    row: ProfileRow, comfortable: Scores, shown: Scores, name: str, mode: Mode, variable: str | None = None
+    row: ProfileRow, comfortable: Scores, scores: Scores, name: str, mode: Mode, variable: str | None = None
 ) -> ProfileRow:
-    """The row with the scores against people at their comfortable speed, where others are shown."""
-    if comfortable is shown:
+    """The row with added scores against subjects at comfortable speed, if others are shown."""
+    if comfortable is scores:
         return row
     left, right = (_text(comfortable.find(name, mode, side, variable)) for side in SIDES)
     return replace(row, comfortable_left=left, comfortable_right=right)
 
 
-def _row(title: str, found: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
-    healthy = next((s.healthy for s in found.values() if s.healthy is not None), None)
-    marks = {side: s.value for side, s in found.items() if s.value is not None}
+def _row(title: str, by_side: dict[Side, Score], *, low: bool, total: bool) -> ProfileRow:
+    healthy = next((s.healthy for s in by_side.values() if s.healthy is not None), None)
+    marks = {side: s.value for side, s in by_side.items() if s.value is not None}
     ends = None if healthy is None else (healthy.median_deg, healthy.p75_deg, healthy.p95_deg)
     return ProfileRow(
         title=title,
-        left=_text(found["left"]),
-        right=_text(found["right"]),
+        left=_text(by_side["left"]),
+        right=_text(by_side["right"]),
         healthy="" if healthy is None else format_number(healthy.median_deg, 1),
         svg=_bar(marks, ends),
         low_confidence=low,
@@ -206,14 +205,16 @@ def _text(score: Score) -> str:
 
 
 def _bar(marks: dict[Side, float], healthy: tuple[float, float, float] | None) -> str:
-    """Healthy to the 75th (dark) and 95th percentile (light), median as a line; left disc, right ring."""
+    """Bar to the 75th (dark) and 95th percentile (light) of healthy subjects with median, left and right
+    marks.
+    """
     median, p75, p95 = healthy or (None, None, None)
     boxes = [(0.0, end) for end in (p95, p75) if end is not None]
     return draw_bar(marks, boxes, median, (0.0, SCALE_DEG), WIDTH)
 
 
 def _index(scores: Scores) -> str:
-    """GDI* of the sagittal profile; an index that misses is said with its reason."""
+    """GDI* of the sagittal profile; a missing index is given with its reason."""
     parts = []
     for side in SIDES:
         s = scores.find("gdi_star_sagittal", MODE, side)

@@ -1,4 +1,4 @@
-"""Is the data good: the box above everything else, in words and a few numbers."""
+"""Data quality: the box at the top, in words and a few numbers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class QualityItem:
 
     Parameters
     ----------
-    kind : ok, warn or bad where it is a judgement. page : of the session, where more about it stands.
+    kind : ok, warn or bad if it is an assessment. page : session page with details.
     """
 
     label: str
@@ -55,12 +55,11 @@ class QualityItem:
 
 @dataclass(frozen=True)
 class QualityBox:
-    """Verdict (`kind` ok, warn, bad and its word) and the facts behind it.
+    """Overall quality (`kind` ok, warn, bad and its word) and supporting facts.
 
     Parameters
     ----------
-    reason : why the data are not good, in sentences; empty where they are.
-    more : warnings beside that reason.
+    reason : why the data are not good, in sentences; empty if they are. more : number of further warnings.
     """
 
     kind: str
@@ -71,18 +70,18 @@ class QualityBox:
 
 
 def quality_box(bundle: Bundle) -> QualityBox:
-    """Judge a finished analysis.
+    """Assess the data quality of a finished analysis.
 
-    Bad when the analysis stopped, no stride counts, the signals are poor or the pose estimator cannot stand
-    behind its result; warn when the signals are only usable, the estimator doubts, any stage has a warning or
-    no day of daily life is complete; else ok. A notice for information changes nothing.
+    Bad if the analysis stopped, no stride is included, the signals are poor or the estimator reports its
+    result as unreliable; warn if the signals are only usable, the estimator reports doubts, any stage has a
+    warning or no day of daily life is complete; otherwise ok. Informational notices have no effect.
     """
     kind, word = data_verdict(
         bundle.quality, bundle.estimator, {n.severity for n in bundle.warnings}, bundle.parameters
     )
     items = [
         *_counted(bundle),
-        *_signals(bundle.quality, rest=bundle.activity is None),
+        *_signals(bundle.quality, with_rest=bundle.activity is None),
         *_calibration(
             bundle.calibration,
             bundle.calibration_score,
@@ -99,24 +98,24 @@ def quality_box(bundle: Bundle) -> QualityBox:
 
 
 def explain_verdict(kind: str, bundle: Bundle) -> tuple[str, int]:
-    """Why the data are not good, and how many warnings there are besides.
+    """Reason why the data are not good, and the number of further warnings.
 
-    What stopped the analysis goes first, then sensors that contradict each other, a sensor that failed, and
-    the first of the other warnings.
+    Errors that stopped the analysis come first, then contradictory sensors, a failed sensor, and the first of
+    the other warnings.
     """
     if kind == "ok":
         return "", 0
     daily = _daily_steps(bundle.parameters)
     if kind == "warn" and daily is not None and not daily.n:
         return NO_WHOLE_DAY, sum(n.severity == "warning" for n in bundle.warnings)
-    told = [n for n in bundle.warnings if n.severity in ("error", "warning")]
-    told.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
+    problems = [n for n in bundle.warnings if n.severity in ("error", "warning")]
+    problems.sort(key=lambda n: (n.severity != "error", n.code != "sensor_failed"))
     health = None if bundle.estimator is None else bundle.estimator["verdict"]
     reasons = tuple(bundle.quality.get("reasons", ()))
-    if kind == "bad" and health == "bad" and reasons and not (told and told[0].severity == "error"):
-        return speak_places(reasons[-1]), len(told)
-    if told:
-        return speak_places(told[0].message), len(told) - 1
+    if kind == "bad" and health == "bad" and reasons and not (problems and problems[0].severity == "error"):
+        return speak_places(reasons[-1]), len(problems)
+    if problems:
+        return speak_places(problems[0].message), len(problems) - 1
     if reasons:
         return speak_places(reasons[0]), 0
     return (IN_DOUBT if kind == "bad" else ""), 0
@@ -128,11 +127,11 @@ def data_verdict(
     severities: Collection[str],
     parameters: Sequence[Parameter],
 ) -> tuple[str, str]:
-    """Shape (ok, warn, bad) and word for the data of an analysis; the same in every list and on its page.
+    """Symbol (ok, warn, bad) and word for the data quality, used in all lists and pages.
 
     Parameters
     ----------
-    quality, estimator : of analysis.json. severities : of its notices. parameters : as they count.
+    quality, estimator : of analysis.json. severities : of its notices. parameters : current values.
     """
     health = None if estimator is None else cast("Verdict", estimator["verdict"])
     level = find_shown_level(quality.get("level", "good"), health)
@@ -163,41 +162,41 @@ def data_verdict(
 
 
 def _name_bad_estimate(estimator: Mapping[str, Any]) -> str:
-    """What disagrees: the sensors, or the path of a foot with its own rests."""
+    """The inconsistency: between sensors, or between a foot's path and its rest periods."""
     bad = [f["name"] for f in estimator.get("health", ()) if f["verdict"] == "bad"]
     return "Foot path in doubt" if concern_paths_alone(bad) else "Sensors disagree"
 
 
 def _trunk_steps(parameters: Sequence[Parameter]) -> int:
-    """Steps that a trunk sensor told, where no foot carries one."""
+    """Number of steps detected by a trunk sensor, if there are no foot sensors."""
     return next((int(p.mean) for p in parameters if p.name == "step_count" and p.mean is not None), 0)
 
 
 def is_test(parameters: Sequence[Parameter]) -> bool:
-    """Is the take a functional test?"""
+    """Whether the trial is a functional test."""
     return any(is_functional(p.name) for p in parameters)
 
 
 def _squats(parameters: Sequence[Parameter]) -> list[Parameter]:
-    """The depth of each leg of a take of squats, with the number of those that count; none of any other."""
+    """Depth of squats of each leg, with the number of included ones; empty for other trials."""
     return [p for p in parameters if p.name == "squat_depth_deg"]
 
 
 def _daily_steps(parameters: Sequence[Parameter]) -> Parameter | None:
-    """Steps a day of a take of daily life, with the number of days behind them; None of any other take."""
+    """Steps per day of a daily-life recording, with the number of days; None for other trials."""
     return next((p for p in parameters if p.name == "daily_step_count"), None)
 
 
 def _counted(bundle: Bundle) -> list[QualityItem]:
-    """Strides of the feet, or steps of the trunk where there are none; of squats those that count.
+    """Included strides of the feet, otherwise steps from the trunk; for squats the included repetitions.
 
-    Of daily life the hours worn, and the days that were worn long enough.
+    For daily life the hours of wear, and the number of days with sufficient wear time.
     """
     if bundle.activity is not None:
-        worn = sum(day.worn_h for day in bundle.activity.days)
+        hours = sum(day.worn_h for day in bundle.activity.days)
         whole, days = _daily_steps(bundle.parameters), len(bundle.activity.days)
         return [
-            QualityItem("Worn", f"{format_number(worn, 1)}\u202fh"),
+            QualityItem("Worn", f"{format_number(hours, 1)}\u202fh"),
             QualityItem(
                 "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
             ),
@@ -241,8 +240,8 @@ def _strides(bundle: Bundle) -> QualityItem:
     )
 
 
-def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
-    """Lost samples of the worst sensor, magnetic field, and rest where the analysis looked for it."""
+def _signals(quality: Mapping[str, Any], *, with_rest: bool) -> list[QualityItem]:
+    """Lost samples of the worst sensor, magnetic field, and still periods if required by the analysis."""
     items = []
     sensors = [s for s in quality.get("sensors", ()) if isinstance(s, Mapping)]
     lost = [(float(s["lost_pct"]), _sensor_name(s)) for s in sensors if s.get("lost_pct") is not None]
@@ -250,7 +249,7 @@ def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
         worst, name = max(lost)
         extra = "" if worst == 0 else f"at most, {name}"
         items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
-    still = quality.get("rest_s") if rest else None
+    still = quality.get("rest_s") if with_rest else None
     if still is not None:
         total = sum(end - start for start, end in still)
         times = f"in {len(still)} parts" if len(still) > 1 else ""
@@ -265,18 +264,18 @@ def _signals(quality: Mapping[str, Any], *, rest: bool) -> list[QualityItem]:
 def _calibration(
     calibration: Mapping[str, Any] | None, score: Mapping[str, Any] | None, *, needed: bool
 ) -> list[QualityItem]:
-    """How it was done and how many of its checks it passes, and what an angle of zero is."""
+    """Calibration method, number of checks passed, and zero of the angles."""
     if calibration is None:
         # steps of a trunk sensor are read from it as it sits
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
         method = "from walking alone"
-    judged = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
-    if judged:
-        passed = judged.count("pass")
-        kind = None if passed == len(judged) else "warn"
-        value = f"{passed} of {len(judged)} {plural(len(judged), 'check', 'checks')}"
+    verdicts = [c["verdict"] for c in (score or {"checks": ()})["checks"] if c["verdict"] != "not_judged"]
+    if verdicts:
+        passed = verdicts.count("pass")
+        kind = None if passed == len(verdicts) else "warn"
+        value = f"{passed} of {len(verdicts)} {plural(len(verdicts), 'check', 'checks')}"
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:
         items = [QualityItem("Calibration", method)]

@@ -1,4 +1,4 @@
-"""A sensitivity analysis of squats as files, text and page, in the layout of Kianifar's tables 2 and 3.
+"""Sensitivity analysis of squats as files, text and page, in the layout of Kianifar's tables 2 and 3.
 
 {stem}.json   everything, angles in degrees (schema 1)      {stem}.csv   one row per parameter and angle
 """
@@ -91,10 +91,10 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
 def summarise_sensitivity(
     legs: Mapping[Side, SensitivityTable], reference: str | None, *, from_standing: bool
 ) -> dict[str, Any]:
-    """Everything as plain JSON values; `reference` = name of what it was held against, None = itself."""
+    """Convert to JSON types; `reference` = name of the reference, None = itself."""
     table = next(iter(legs.values()))
     steps = {row.unit: row.step for row in table.rows}
-    found = reduce_to_plain(
+    summary = reduce_to_plain(
         {
             "schema": SCHEMA,
             "reference": reference,
@@ -114,8 +114,8 @@ def summarise_sensitivity(
             ],
         }
     )
-    assert isinstance(found, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
-    return found
+    assert isinstance(summary, dict)  # noqa: S101 (narrows the type; `reduce_to_plain` keeps mappings)
+    return summary
 
 
 def _average(rows: Sequence[SensitivityRow]) -> Floats:
@@ -142,24 +142,24 @@ def _row(row: SensitivityRow) -> dict[str, object]:
     }
 
 
-def sensitivity_files(found: Mapping[str, Any], stem: str) -> dict[str, bytes]:
+def sensitivity_files(summary: Mapping[str, Any], stem: str) -> dict[str, bytes]:
     """File name → content."""
     return {
-        f"{stem}.json": json.dumps(found, ensure_ascii=False, allow_nan=False, indent=1).encode(),
-        f"{stem}.csv": sensitivity_csv(found),
+        f"{stem}.json": json.dumps(summary, ensure_ascii=False, allow_nan=False, indent=1).encode(),
+        f"{stem}.csv": sensitivity_csv(summary),
     }
 
 
-def sensitivity_csv(found: Mapping[str, Any]) -> bytes:
-    """One row per leg, parameter and angle; what is not defined is empty."""
+def sensitivity_csv(summary: Mapping[str, Any]) -> bytes:
+    """One row per leg, parameter and angle; undefined values are empty."""
 
     def cells(values: list[float | None] | None, i: int) -> float | None:
         return None if values is None else values[i]
 
     def rows() -> Iterator[Sequence[object]]:
-        for leg in found["legs"]:
+        for leg in summary["legs"]:
             for row in leg["rows"]:
-                for i, angle in enumerate(found["angles"]):
+                for i, angle in enumerate(summary["angles"]):
                     yield (
                         leg["side"], row["name"], angle, row["nominal"], row["unit"], leg["error_deg"][i],
                         cells(row["sensitivity_pct"], i), cells(row["delta_relative_deg"], i), row["step"],
@@ -169,12 +169,12 @@ def sensitivity_csv(found: Mapping[str, Any]) -> bytes:
     return write_csv(HEADER, rows())
 
 
-def tell_sensitivity(found: Mapping[str, Any]) -> list[str]:
-    """Lines for a terminal: tables 2 and 3 in % where there is a reference, and changes in degrees."""
+def tell_sensitivity(summary: Mapping[str, Any]) -> list[str]:
+    """Lines for a terminal: tables 2 and 3 in % if there is a reference, and changes in degrees."""
     lines: list[str] = []
-    against = found["reference"]
-    share, steps = f"± {found['relative_pct']:g} %", _say_steps(found)
-    for leg in found["legs"]:
+    against = summary["reference"]
+    share, steps = f"± {summary['relative_pct']:g} %", _say_steps(summary)
+    for leg in summary["legs"]:
         lines.append(f"{leg['side'].capitalize()} leg")
         if against is not None:
             errors = (f"{n} {e:.2f}" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
@@ -184,31 +184,34 @@ def tell_sensitivity(found: Mapping[str, Any]) -> list[str]:
                 rows = [(r["name"], _texts(r["sensitivity_pct"], columns, averaged, 1)) for r in leg["rows"]]
                 rows.append(("Average", _texts(leg["average_pct"], columns, averaged, 1)))
                 lines += _layout((*(COLUMNS[i] for i in columns), name), rows)
-        what = "Change of the RMS error in °" if against is not None else "RMS change of the angles in °"
+        heading = "Change of the RMS error in °" if against is not None else "RMS change of the angles in °"
         every = tuple(range(len(COLUMNS)))
-        for title, member in ((f"{what}, {share}", SHOWN["share"]), (f"{what}, by {steps}", SHOWN["step"])):
+        for title, member in (
+            (f"{heading}, {share}", SHOWN["share"]),
+            (f"{heading}, by {steps}", SHOWN["step"]),
+        ):
             lines.append(title)
             lines += _layout(COLUMNS, [(r["name"], _texts(r[member], every, (), 3)) for r in leg["rows"]])
-    if any(row["reason"] for leg in found["legs"] for row in leg["rows"]):
+    if any(row["reason"] for leg in summary["legs"] for row in leg["rows"]):
         lines.append("– : nominal value 0 or near a pole; nothing can be a share of it off.")
     lines.append("Tables: docs/science/squat.md. A quotient by an error below 0.1° is not given.")
     return lines
 
 
-def _say_steps(found: Mapping[str, Any]) -> str:
-    return f"steps of {found['step_mm']:g} mm and {found['step_deg']:g}°"
+def _say_steps(summary: Mapping[str, Any]) -> str:
+    return f"steps of {summary['step_mm']:g} mm and {summary['step_deg']:g}°"
 
 
 def _texts(
     values: Sequence[float | None] | None, columns: tuple[int, ...], averaged: tuple[int, ...], digits: int
 ) -> list[str]:
-    """Cells of a row, the average of some columns behind them."""
+    """Cells of a row, followed by the average of some columns."""
     if values is None:
         return ["–"] * (len(columns) + bool(averaged))
     chosen = [values[i] for i in columns]
     if averaged:
-        known = [v for v in (values[i] for i in averaged) if v is not None]
-        chosen.append(sum(known) / len(known) if known else None)
+        finite = [v for v in (values[i] for i in averaged) if v is not None]
+        chosen.append(sum(finite) / len(finite) if finite else None)
     return ["–" if v is None else format_number(v, digits) for v in chosen]
 
 
@@ -228,7 +231,7 @@ class SensitivityCell:
 
 @dataclass(frozen=True)
 class SensitivityLine:
-    """A parameter in words, the paper's name, its cells, and why they are empty."""
+    """A parameter in words, its name in the paper, its cells, and the reason if they are empty."""
 
     words: str
     name: str
@@ -238,12 +241,12 @@ class SensitivityLine:
 
 @dataclass(frozen=True)
 class SensitivityLeg:
-    """Tables 2 and 3 of a leg side by side.
+    """Tables 2 and 3 for one leg.
 
     Parameters
     ----------
-    parts : title of each table and its columns. groups : title and lines. average : last line, None where
-        quantities are no quotients. errors : RMS errors against the reference in words, empty without one.
+    parts : title of each table and its columns. groups : title and lines. average : last line, None for
+        quantities that are not ratios. errors : RMS errors against the reference in words, empty without one.
     """
 
     side: str
@@ -255,12 +258,12 @@ class SensitivityLeg:
 
 @dataclass(frozen=True)
 class SensitivityView:
-    """What the page shows.
+    """Content of the page.
 
     Parameters
     ----------
-    shown : one of `SHOWN`, and choices : (value, words) of those that can be shown.
-    sentences : what the numbers say, the most important first.
+    shown : one of `SHOWN`, and choices : (value, words) of those available.
+    sentences : interpretation, the most important first.
     """
 
     reference: str | None
@@ -277,70 +280,72 @@ REASONS: Final[Mapping[str | None, str]] = {
 }
 
 
-def view_sensitivity(content: bytes, shown: str) -> SensitivityView:
-    """The view of a {stem}.json; `shown` that it does not have becomes "step"."""
-    found = json.loads(content)
-    choices = [("step", f"{found['step_mm']:g} mm and {found['step_deg']:g}°")]
-    choices.append(("share", f"± {found['relative_pct']:g} %"))
-    if found["reference"] is not None:
+def view_sensitivity(content: bytes, selected: str) -> SensitivityView:
+    """View of a {stem}.json; an unavailable `selected` is replaced by "step"."""
+    summary = json.loads(content)
+    choices = [("step", f"{summary['step_mm']:g} mm and {summary['step_deg']:g}°")]
+    choices.append(("share", f"± {summary['relative_pct']:g} %"))
+    if summary["reference"] is not None:
         choices.append(("quotient", "Sensitivity in %"))
-    shown = shown if shown in dict(choices) else "step"
+    selected = selected if selected in dict(choices) else "step"
     return SensitivityView(
-        reference=found["reference"],
-        shown=shown,
+        reference=summary["reference"],
+        shown=selected,
         choices=tuple(choices),
-        unit="%" if shown == "quotient" else "°",
-        sentences=tuple(_speak(found)),
-        legs=tuple(_view_leg(leg, shown, against=found["reference"] is not None) for leg in found["legs"]),
+        unit="%" if selected == "quotient" else "°",
+        sentences=tuple(_speak(summary)),
+        legs=tuple(
+            _view_leg(leg, selected, against=summary["reference"] is not None) for leg in summary["legs"]
+        ),
     )
 
 
-def _speak(found: Mapping[str, Any]) -> Iterator[str]:
-    """What matters most, and how much less the body does."""
-    largest = {title: _find_largest(found, names) for title, names in GROUPS}
-    what = "error changes" if found["reference"] is not None else "angle changes"
+def _speak(data: Mapping[str, Any]) -> Iterator[str]:
+    """Most important parameters, and the smaller influence of the body."""
+    largest = {title: _find_largest(data, names) for title, names in GROUPS}
+    noun = "error changes" if data["reference"] is not None else "angle changes"
     turn, place, body = (largest[title] for title, _ in GROUPS)
     yield (
-        f"A sensor turned by {found['step_deg']:g}° matters most: an {what} by up to "
+        f"A sensor turned by {data['step_deg']:g}° matters most: an {noun} by up to "
         f"{format_number(turn[0], 1)}° ({turn[1]})."
     )
     yield (
-        f"A sensor {found['step_mm']:g} mm off its place: up to {format_number(place[0], 2)}°. A measure of "
-        f"the body {found['step_mm']:g} mm off: up to {format_number(body[0], 2)}°."
+        f"A sensor {data['step_mm']:g} mm off its place: up to {format_number(place[0], 2)}°. A measure of "
+        f"the body {data['step_mm']:g} mm off: up to {format_number(body[0], 2)}°."
     )
 
 
-def _find_largest(found: Mapping[str, Any], names: Mapping[str, str]) -> tuple[float, str]:
-    """Largest change by a step, and of which angle by which parameter in words."""
-    most, where = -1.0, ""
-    for leg in found["legs"]:
+def _find_largest(data: Mapping[str, Any], names: Mapping[str, str]) -> tuple[float, str]:
+    """Largest change caused by a step, with angle and parameter in words."""
+    most, location = -1.0, ""
+    for leg in data["legs"]:
         for row in leg["rows"]:
             if row["name"] not in names:
                 continue
             for i, value in enumerate(row["delta_step_deg"]):
                 if value is not None and value > most:
                     angle = JOINTS[i].replace("_", " ")
-                    most, where = value, f"{leg['side']} {angle}; {names[row['name']].lower()}"
-    return most, where
+                    most, location = value, f"{leg['side']} {angle}; {names[row['name']].lower()}"
+    return most, location
 
 
-def _view_leg(leg: Mapping[str, Any], shown: str, *, against: bool) -> SensitivityLeg:
+def _view_leg(leg: Mapping[str, Any], selected: str, *, against: bool) -> SensitivityLeg:
     rows = {row["name"]: row for row in leg["rows"]}
-    digits = 0 if shown == "quotient" else 2
+    digits = 0 if selected == "quotient" else 2
 
     def cells(values: Sequence[float | None] | None) -> tuple[SensitivityCell, ...]:
         texts = [x for _, columns, averaged, _ in TABLES for x in _texts(values, columns, averaged, digits)]
         return tuple(SensitivityCell(x, not x.strip("0.–")) for x in texts)
 
     def line(name: str, words: str) -> SensitivityLine:
-        why = "" if shown == "step" else REASONS.get(rows[name]["reason"], "")
-        return SensitivityLine(words, name, cells(rows[name][SHOWN[shown]]), why)
+        reason = "" if selected == "step" else REASONS.get(rows[name]["reason"], "")
+        return SensitivityLine(words, name, cells(rows[name][SHOWN[selected]]), reason)
 
     errors = (f"{n} {format_number(e, 1)}°" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
     return SensitivityLeg(
         side=leg["side"],
         parts=tuple((title, (*(COLUMNS[i] for i in columns), "Average")) for title, columns, _, _ in TABLES),
-        groups=tuple((of, tuple(line(*entry) for entry in names.items())) for of, names in GROUPS),
-        average=cells(leg["average_pct"]) if shown == "quotient" else None,
+        groups=tuple((group, tuple(line(*entry) for entry in names.items())) for group, names in GROUPS),
+        average=cells(leg["average_pct"]) if selected == "quotient" else None,
         errors=", ".join(errors) if against else "",
     )

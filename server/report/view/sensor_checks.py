@@ -1,4 +1,4 @@
-"""What was checked of every sensor's clock and place, in words; also where nothing could be judged."""
+"""Consistency checks of every sensor's clock and placement in words, including those not possible."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ NOT_JUDGED: Final = "cannot be judged"
 
 @dataclass(frozen=True)
 class SensorCheck:
-    """One sensor: words for its clock and its place, with a kind (ok, warn, or none where not judged)."""
+    """One sensor: words for its clock and placement, with a kind (ok, warn, or none if not checked)."""
 
     sensor: str
     clock: str
@@ -24,12 +24,11 @@ class SensorCheck:
 
 @dataclass(frozen=True)
 class SensorChecks:
-    """All sensors of a take.
+    """All sensors of a trial.
 
     Parameters
     ----------
-    exchanged : pairs that were found on each other's segments, in words; empty where none.
-    notes : what the table cannot say, in sentences.
+    exchanged : pairs of swapped sensors, in words; empty if none. notes : supplementary sentences.
     """
 
     rows: tuple[SensorCheck, ...]
@@ -37,13 +36,13 @@ class SensorChecks:
     notes: tuple[str, ...]
 
 
-def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
-    """View of `agreement` in analysis.json; None where an older version wrote it or one sensor was worn."""
-    if found is None or len(found["sensors"]) < 2:
+def sensor_checks(checks: Mapping[str, Any] | None) -> SensorChecks | None:
+    """View of `agreement` in analysis.json; None for older versions or a single sensor."""
+    if checks is None or len(checks["sensors"]) < 2:
         return None
-    rows = tuple(_row(s) for s in found["sensors"])
-    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in found["exchanged"]]
-    unclear = [s for s in found["sensors"] if s.get("place_judged_s") is None]
+    rows = tuple(_row(s) for s in checks["sensors"])
+    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in checks["exchanged"]]
+    unclear = [s for s in checks["sensors"] if s.get("place_judged_s") is None]
     notes = []
     if any(s["sensor"] == "pelvis" for s in unclear):
         notes.append(
@@ -55,9 +54,9 @@ def sensor_checks(found: Mapping[str, Any] | None) -> SensorChecks | None:
             "That a sensor stayed is said where a slip would have been seen for most of the walk. Stand "
             "still before and after it, or walk for longer."
         )
-    if not all(s["clock_judged"] for s in found["sensors"]):
+    if not all(s["clock_judged"] for s in checks["sensors"]):
         notes.append("A clock is judged where a neighbour across a hip, knee or ankle is worn, in walking.")
-    if len(unclear) < len(found["sensors"]):
+    if len(unclear) < len(checks["sensors"]):
         notes.append("Straps that loosen slowly, and a second slip of a sensor, are not found.")
     return SensorChecks(rows, "; ".join(pairs), tuple(notes))
 
@@ -89,7 +88,7 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
             "warn",
         )
     # an older version did not say from when to when it could judge
-    if (judged := s.get("place_judged_s")) is None:
+    if (duration_s := s.get("place_judged_s")) is None:
         return f"Place {NOT_JUDGED}", ""
-    start, end = (format_number(x) for x in judged)
+    start, end = (format_number(x) for x in duration_s)
     return f"Stayed from {start} to {end}\u202fs", "ok"

@@ -1,4 +1,4 @@
-"""Where sensors sit and joints lie by the motion of a take, beside the nominal places, as a page shows it."""
+"""View of sensor and joint positions estimated from motion, compared with nominal positions."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ AXES: Final = ("forward", "up", "outward")
 
 @dataclass(frozen=True)
 class PlaceRow:
-    """One sensor, or one joint in the axes of the segment above it.
+    """One sensor, or one joint in the axes of its proximal segment.
 
     Parameters
     ----------
-    values : along `AXES` in cm with their uncertainty, as text. measured : motion was heard at all.
-    nominal : the place that is usual, as text. off : what is clearly elsewhere and by how much; else empty.
+    values : along `AXES` in cm with their uncertainty, as text. measured : estimated from motion.
+    nominal : nominal position, as text. off : significant deviation; otherwise empty.
     """
 
     title: str
@@ -33,7 +33,7 @@ class PlaceRow:
 
 @dataclass(frozen=True)
 class KneeAxisRow:
-    """The hinge of one knee seen from thigh and shank, each with its uncertainty, as text."""
+    """Hinge axis of one knee relative to thigh and shank, with uncertainties, as text."""
 
     title: str
     thigh: str
@@ -42,7 +42,7 @@ class KneeAxisRow:
 
 @dataclass(frozen=True)
 class SensorPlaces:
-    """What the page shows."""
+    """Content of the page."""
 
     sensors: tuple[PlaceRow, ...]
     joints: tuple[PlaceRow, ...]
@@ -61,7 +61,7 @@ JOINTS: Final = {
 
 
 def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
-    """View of `sensor_places` in analysis.json; None where motion was not asked."""
+    """View of `sensor_places` in analysis.json; None if not estimated from motion."""
     if stored is None:
         return None
     return SensorPlaces(
@@ -92,12 +92,14 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
 def _view_place(title: str, left: bool, stored: Mapping[str, Any], measured: Sequence[bool]) -> PlaceRow:
     # outward is to the left on the left
     out = (1.0, 1.0, -1.0 if left else 1.0)
-    found, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
+    estimate, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
     spread = stored["sd_cm"]
-    a, b, c = (f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(found, spread, strict=True))
+    a, b, c = (
+        f"{format_number(x, 1)} ± {format_number(sd, 1)}" for x, sd in zip(estimate, spread, strict=True)
+    )
     off = [
         f"{format_number(abs(x - y), 1)} cm {axis if x > y else OPPOSITE[axis]}"
-        for axis, x, y, sd, heard in zip(AXES, found, guess, spread, measured, strict=True)
+        for axis, x, y, sd, heard in zip(AXES, estimate, guess, spread, measured, strict=True)
         if heard and abs(x - y) > OFF_SD * sd
     ]
     nominal = ", ".join(format_number(x, 1) for x in guess)

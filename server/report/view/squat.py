@@ -1,4 +1,4 @@
-"""A take of squats on the session page: every repetition, and the courses of the legs' angles over it."""
+"""View of squats: every repetition, and mean angle curves of the legs."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ UNSURE_FIGURES: Final = ("squat_knee_valgus", "squat_hip_adduction", "squat_hip_
 
 @dataclass(frozen=True)
 class RepetitionRow:
-    """One squat in words; `excluded` says why it does not count, and then the numbers are empty.
+    """One squat in words; `excluded` is the reason for exclusion, in which case numbers are empty.
 
     Parameters
     ----------
-    number : among the squats of its leg.
+    number : index among the squats of its leg.
     """
 
     number: int
@@ -67,7 +67,7 @@ class RepetitionRow:
 
 @dataclass(frozen=True)
 class SquatSpan:
-    """When a squat was, for the clock of the page, s."""
+    """Period of a squat for the page's clock, s."""
 
     side: Side
     start_s: float
@@ -77,13 +77,13 @@ class SquatSpan:
 
 @dataclass(frozen=True, eq=False)
 class SquatView:
-    """The squats of a take.
+    """The squats of a trial.
 
     Parameters
     ----------
-    sides : legs that squatted. rows : in order of time. used : leg → squats that count.
-    lifted : leg → bends of its knee with the foot off the floor, which are no squats of it.
-    charts : titles and drawings, empty without a squat that counts. means_deg : variable → leg → (101,).
+    sides : legs with squats. rows : in order of time. used : leg → number of included squats.
+    lifted : leg → number of knee bends with the foot off the floor, which are not squats.
+    charts : titles and drawings, empty without included squats. means_deg : variable → leg → (101,).
     spans : of all rows.
     """
 
@@ -97,19 +97,19 @@ class SquatView:
 
     @property
     def title(self) -> str:
-        """Which legs squatted."""
+        """Legs that performed squats, in words."""
         return f"{self.sides[0]} leg" if len(self.sides) == 1 else "both legs"
 
     @property
     def not_listed(self) -> str:
-        """What was left out of the rows, in a sentence; empty where there is nothing."""
+        """Repetitions not listed, in a sentence; empty if there are none."""
         legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
         if not legs:
             return ""
         return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
 
     def to_json(self) -> dict[str, object]:
-        """What the report's JSON has of it; curves lie in angles.parquet, figures in repetitions.csv."""
+        """Content of the report's JSON; curves are in angles.parquet, values in repetitions.csv."""
         return {
             "sides": self.sides,
             "used": self.used,
@@ -119,18 +119,18 @@ class SquatView:
 
 
 def squat_view(bundle: Bundle) -> SquatView | None:
-    """The squats of a finished analysis; None of another movement, and where nobody squatted."""
-    found = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
-    if not found:
+    """The squats of a finished analysis; None for other movements or without squats."""
+    squats = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
+    if not squats:
         return None
     lifted = Counter(r.side for r in bundle.repetitions or () if r.excluded == FOOT_LIFTED)
     numbers: Counter[Side] = Counter()
     rows = []
-    for r in found:
+    for r in squats:
         numbers[r.side] += 1
         rows.append(_row(numbers[r.side], r))
     curves = {
-        side: _curves(bundle, side, [r for r in found if r.side == side and r.excluded is None])
+        side: _curves(bundle, side, [r for r in squats if r.side == side and r.excluded is None])
         for side in SIDES
         if numbers[side]
     }
@@ -138,7 +138,7 @@ def squat_view(bundle: Bundle) -> SquatView | None:
     return SquatView(
         sides=tuple(curves),
         rows=tuple(rows),
-        used={side: sum(r.excluded is None for r in found if r.side == side) for side in curves},
+        used={side: sum(r.excluded is None for r in squats if r.side == side) for side in curves},
         lifted={side: lifted[side] for side in SIDES if lifted[side]},
         charts=tuple(
             {
@@ -154,7 +154,7 @@ def squat_view(bundle: Bundle) -> SquatView | None:
             p.variable.name: {s: c.mean_deg for s, c in p.sides.items() if c.mean_deg is not None}
             for p in panels
         },
-        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in found),
+        spans=tuple(SquatSpan(r.side, r.start_s, r.end_s, r.excluded is None) for r in squats),
     )
 
 
@@ -174,28 +174,28 @@ def _row(number: int, r: StoredRepetition) -> RepetitionRow:
     )
 
 
-def _curves(bundle: Bundle, side: Side, counted: Sequence[StoredRepetition]) -> dict[str, Floats]:
-    """Variable → (counted, 101) degrees."""
-    if bundle.angles is None or not counted:
+def _curves(bundle: Bundle, side: Side, included: Sequence[StoredRepetition]) -> dict[str, Floats]:
+    """Variable → (included, 101) degrees."""
+    if bundle.angles is None or not included:
         return {}
-    found = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in counted])
-    return {name: np.degrees(rows) for name, rows in found.items()}
+    cycles = cut_curves(bundle.angles, side, [(r.start_s, r.end_s) for r in included])
+    return {name: np.degrees(rows) for name, rows in cycles.items()}
 
 
 def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> CurvePanel | None:
-    """The courses of a variable over the squats of every leg; None where no leg has it."""
+    """Curves of a variable over the squats of each leg; None if no leg has any."""
     legs = {side: of_leg[variable.name] for side, of_leg in curves.items() if variable.name in of_leg}
     if not legs:
         return None
     sides, first = {}, 0
     for side, rows in legs.items():
-        known: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
-        if known:
+        complete: Sequence[int] = np.flatnonzero(np.isfinite(rows).all(axis=1)).tolist()
+        if complete:
             sides[side] = SideCurve(
-                mean_deg=rows[known].mean(axis=0),
-                sd_deg=rows[known].std(axis=0, ddof=1) if len(known) > 1 else None,
-                n=len(known),
-                strides={first + i: rows[i] for i in known},
+                mean_deg=rows[complete].mean(axis=0),
+                sd_deg=rows[complete].std(axis=0, ddof=1) if len(complete) > 1 else None,
+                n=len(complete),
+                strides={first + i: rows[i] for i in complete},
                 foot_off_pct=None,
                 foot_off_sd=None,
             )

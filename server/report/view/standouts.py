@@ -1,6 +1,6 @@
-"""Figures of a take that stand out: each against its norm, a limit or the other side, in one sentence.
+"""Findings of a trial: parameters compared with norm, limit or other side, one sentence each.
 
-What becomes of the sentences says server/report/view/headline.py.
+For the selection of sentences see server/report/view/headline.py.
 """
 
 from __future__ import annotations
@@ -17,13 +17,18 @@ from sagittal.core.parameters.variability import NORMAL_95
 from sagittal.server.report.view.headline import (
     LARGEST,
     HeadlineSentence,
-    choose_digits,
+    format_amount,
     make_sentence,
     take_largest,
 )
 from sagittal.server.report.view.level import from_standing
 from sagittal.server.report.view.table import BEYOND_SD, ParameterRow, TableCell
 from sagittal.server.report.words.headline_phrases import (
+    NORM,
+    OF_BOTH,
+    OF_SIDE,
+    OF_SIDES,
+    OF_TRIAL,
     PELVIS_RISES,
     PHRASES,
     SHORT_AND_QUICK,
@@ -41,24 +46,24 @@ AT_SPEED: Final = "people at this speed"
 def find_standouts(
     rows: Sequence[ParameterRow], norms: Norms, flags: Sequence[Flag] = ()
 ) -> tuple[tuple[HeadlineSentence, ...], int]:
-    """Figures beyond the norm, a limit or the other side, largest first, and how many could have been.
+    """Findings against norm, limits or the other side, largest first, and the number considered.
 
     Parameters
     ----------
-    rows : of the parameter table, every angle from the zero of its curve (`level.choose_zero`).
-    norms : they were held against.
+    rows : of the parameter table, every angle with the zero of its curve (`level.choose_zero`).
+    norms : used for the comparison.
     flags : values against limits.
     """
-    told = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
-    found = [s for row in told for s in _of_row(row, norms)]
-    found = _join_steps(found, {row.name: row for row in told})
-    found += _of_flags(flags)
+    candidates = [row for row in rows if _phrases(row.name) is not None and not row.low_confidence]
+    sentences = [s for row in candidates for s in _of_row(row, norms)]
+    sentences = _join_steps(sentences, {row.name: row for row in candidates})
+    sentences += _of_flags(flags)
     looked_at = sum(
         any(c is not None and c.z is not None for c in (row.both, row.left, row.right))
         or row.symmetry is not None
-        for row in told
+        for row in candidates
     )
-    return take_largest(found), looked_at
+    return take_largest(sentences), looked_at
 
 
 def _phrases(name: str) -> Phrases | None:
@@ -66,14 +71,14 @@ def _phrases(name: str) -> Phrases | None:
 
 
 def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
-    """At most one sentence: whichever comparison says most of the figure."""
+    """At most one sentence: that of the comparison with the largest deviation."""
     p = _phrases(row.name)
     if p is None:
         return
     if row.both is not None:
         z = _certain_z(row, row.both)
         if z is not None and abs(z) > BEYOND_SD:
-            yield from _against_norm(row, p.both_low if z < 0 else p.both_high, None, abs(z), p)
+            yield from _against_norm(row, p, OF_TRIAL, z)
         return
     z_of = {side: z for side in SIDES if (z := _certain_z(row, _cell(row, side))) is not None}
     apart = _of_sides(row, p, norms)
@@ -81,7 +86,7 @@ def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
         # sides that cannot be told apart speak together
         mean = sum(z_of.values()) / len(SIDES)
         if abs(mean) > BEYOND_SD:
-            yield from _against_norm(row, p.both_low if mean < 0 else p.both_high, None, abs(mean), p)
+            yield from _against_norm(row, p, OF_BOTH, mean)
         return
     far = {side: z for side, z in z_of.items() if abs(z) > BEYOND_SD}
     size = max((abs(z) for z in far.values()), default=0.0) / BEYOND_SD
@@ -89,11 +94,11 @@ def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
         yield apart
     elif far:
         side: Side = max(far, key=lambda s: abs(far[s]))
-        yield from _against_norm(row, p.side_low if far[side] < 0 else p.side_high, side, abs(far[side]), p)
+        yield from _against_norm(row, p, OF_SIDE, far[side], side)
 
 
 def _certain_z(row: ParameterRow, cell: TableCell | None) -> float | None:
-    """Deviations from the norm's mean, of people and of the measurement together; None without a norm."""
+    """z-score that includes measurement uncertainty; None without a norm."""
     if cell is None or cell.z is None or row.norm_sd is None:
         return None
     measured = 0.0 if cell.uncertainty is None else cell.uncertainty / NORMAL_95
@@ -101,37 +106,43 @@ def _certain_z(row: ParameterRow, cell: TableCell | None) -> float | None:
 
 
 def _against_norm(
-    row: ParameterRow, pattern: str, side: Side | None, z: float, p: Phrases
+    row: ParameterRow, p: Phrases, pattern: str, z: float, side: Side | None = None
 ) -> Iterator[HeadlineSentence]:
-    if not pattern or row.norm_mean is None or row.norm_sd is None:
+    word = p.low if p.sign * z < 0.0 else p.high
+    if not word:
         return
+    cells = {"l": row.left, "r": row.right, "v": row.both if row.both is not None else _cell(row, side)}
     words = {
-        "a": _number(row, row.norm_mean - row.norm_sd),
-        "b": _number(row, row.norm_mean + row.norm_sd),
-        **{key: _number(row, c.value) for key, c in (("l", row.left), ("r", row.right)) if c is not None},
+        "noun": p.noun,
+        "word": word,
+        "norm": _norm_words(row, p),
+        **{key: _number(row, p.sign * c.value) for key, c in cells.items() if c is not None},
     }
-    spoken = row.both if row.both is not None else _cell(row, side)
-    if spoken is not None:
-        words["v"] = _number(row, spoken.value)
-    yield make_sentence(
-        row.name, p.family, "norm", z / BEYOND_SD, pattern, words, side, _people(row, p.family)
-    )
+    people = _people(row, p.family)
+    yield make_sentence(row.name, p.family, "norm", abs(z) / BEYOND_SD, pattern, words, side, people)
+
+
+def _norm_words(row: ParameterRow, p: Phrases) -> str:
+    if row.norm_mean is None or row.norm_sd is None:
+        return ""
+    mean = format_amount(row.name, p.sign * row.norm_mean, unit=False)
+    return NORM.format(mean=mean, sd=format_amount(row.name, row.norm_sd))
 
 
 def _people(row: ParameterRow, family: Family) -> str:
-    """Of whom a norm is: speed itself cannot be held against people at this speed."""
+    """Reference group of a norm; gait speed itself cannot be compared at matched speed."""
     if family == "speed":
         return "people of this age"
     return AT_SPEED if family == "step" or row.comfortable is not None else "healthy people"
 
 
 def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence | None:
-    """The sides against each other, of the one further from its norm.
+    """Comparison of the sides, naming the one further from its norm.
 
-    None where strides and measurement leave open which is larger, and where both are within the norm.
+    None if the larger side is uncertain given strides and measurement error, or if both are within the norm.
     """
     s = row.symmetry
-    if s is None or not s.clear or s.low is None or s.high is None or not (p.smaller or p.larger):
+    if s is None or not s.clear or s.low is None or s.high is None or not (p.less or p.more):
         return None
     if row.left is None or row.right is None:
         return None
@@ -145,10 +156,16 @@ def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence |
     if side is None:
         return None
     apart = round_difference(row.left.value, row.right.value, parameter_term(name))
-    words = {"d": _number(row, apart), "cm": format_number(100.0 * apart, 0)}
-    return make_sentence(
-        row.name, p.family, "sides", size, p.larger if side == larger else p.smaller, words, side
-    )
+    own, other = (row.left, row.right) if side == "left" else (row.right, row.left)
+    words = {
+        "noun": p.noun,
+        "word": p.more if (side == larger) == (p.sign > 0) else p.less,
+        "d": _number(row, apart),
+        "v": _number(row, p.sign * own.value),
+        "o": _number(row, p.sign * other.value),
+        "norm": _norm_words(row, p),
+    }
+    return make_sentence(row.name, p.family, "sides", size, OF_SIDES, words, side)
 
 
 def _has_norm(row: ParameterRow) -> bool:
@@ -156,41 +173,41 @@ def _has_norm(row: ParameterRow) -> bool:
 
 
 def _side_off_norm(row: ParameterRow) -> Side | None:
-    """The side further from its norm; None where both are within it, as their row shows them.
+    """The side further from the norm; None if both are within it, as their row indicates.
 
-    The uncertainty of a level is mostly common to both sides (the definition of a contact); whether the sides
-    differ is judged by the interval of their difference.
+    The uncertainty of an absolute value is mostly common to both sides (the definition of a contact); whether
+    the sides differ is determined by the confidence interval of their difference.
     """
     z = {side: c.z for side in SIDES if (c := _cell(row, side)) is not None and c.z is not None}
     furthest = max(z, key=lambda side: abs(z[side]))
     return furthest if abs(z[furthest]) > BEYOND_SD else None
 
 
-def _join_steps(found: list[HeadlineSentence], rows: Mapping[str, ParameterRow]) -> list[HeadlineSentence]:
-    """Short steps and a quick cadence are one sentence."""
+def _join_steps(
+    sentences: list[HeadlineSentence], rows: Mapping[str, ParameterRow]
+) -> list[HeadlineSentence]:
+    """Combine short steps and high cadence into one sentence."""
     steps, cadence = rows.get("step_length_m"), rows.get("cadence_spm")
     if steps is None or cadence is None or cadence.both is None or steps.norm_mean is None:
-        return found
+        return sentences
     z = [z for c in (steps.left, steps.right) if (z := _certain_z(steps, c)) is not None]
     quick = _certain_z(cadence, cadence.both)
     if len(z) < len(SIDES) or max(z) >= -BEYOND_SD or quick is None or quick <= BEYOND_SD:
-        return found
-    low, high = steps.norm_mean - (steps.norm_sd or 0.0), steps.norm_mean + (steps.norm_sd or 0.0)
+        return sentences
     mean = sum(c.value for c in (steps.left, steps.right) if c is not None) / len(SIDES)
     words = {
-        "l": _number(steps, mean),
-        "c": _number(cadence, cadence.both.value),
-        "a": _number(steps, low),
-        "b": _number(steps, high),
+        "l": format_amount(steps.name, mean),
+        "c": format_amount(cadence.name, cadence.both.value),
+        "norm": _norm_words(steps, PHRASES["step_length_m"]),
     }
     size = max(-min(z), quick) / BEYOND_SD
-    others = [s for s in found if s.name not in ("step_length_m", "cadence_spm")]
-    told = make_sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
-    return [*others, told]
+    remaining = [s for s in sentences if s.name not in ("step_length_m", "cadence_spm")]
+    sentence = make_sentence("step_length_m", "step", "norm", size, SHORT_AND_QUICK, words, None, AT_SPEED)
+    return [*remaining, sentence]
 
 
 def _of_flags(flags: Sequence[Flag]) -> list[HeadlineSentence]:
-    """What only a limit judges: the pelvis that a side lifts in swing."""
+    """Findings based on limits only: raised pelvis in swing."""
     return [
         make_sentence(
             f.measure,
@@ -212,4 +229,4 @@ def _cell(row: ParameterRow, side: Side | None) -> TableCell | None:
 
 
 def _number(row: ParameterRow, value: float) -> str:
-    return format_number(value, choose_digits(from_standing(row.name) or row.name))
+    return format_amount(row.name, value)

@@ -1,4 +1,4 @@
-"""The parameter table: left, right, difference in words, norm where comparable, a reason where no number."""
+"""Parameter table: left, right, difference in words, comparable norms, reasons for missing values."""
 
 from __future__ import annotations
 
@@ -46,15 +46,15 @@ BEYOND_SD: Final = 2.0
 
 @dataclass(frozen=True)
 class TableCell:
-    """One number with what is behind it; `title` says it in full.
+    """One number with its statistics; `title` is the full text.
 
     Parameters
     ----------
     ci : 95 % confidence interval of the mean over the strides. cv_pct : None below 10 strides.
-    z, percentile : among the norm's people, None without a comparable norm or with too few strides.
-    few : "3 strides" where they are too few to be compared with anything, else "".
-    uncertainty : value ± this holds the truth with 95 %, by strides and measurement; None where not known.
-    plus_minus : "± 0.03", "" without. known_by : both parts in words, for the page of the parameter.
+    z, percentile : relative to the norm, None without a comparable norm or with too few strides.
+    few : "3 strides" if too few for a comparison, otherwise "".
+    uncertainty : 95 % uncertainty from strides and measurement; None if unknown.
+    plus_minus : "± 0.03", "" without. known_by : both components in words, for the parameter page.
     """
 
     value: float
@@ -78,19 +78,18 @@ class ParameterRow:
 
     Parameters
     ----------
-    both : value of the whole take; else `left` and `right`, None where not measured.
+    both : value of the whole trial; otherwise `left` and `right`, None if not measured.
     difference : left against right in words. norm : "62.6 ± 2.0". norm_mean, norm_sd, norm_n, norm_source :
-        behind it; None where no comparable norm exists or too few strides of every side count, `norm_note`
-        then says why if there is a reason.
-        norm_group : its people in words.
-    comfortable : norm of people at their comfortable speed, with its figures, where `norm` is of people at
-        the person's own; else None.
-    reason : words in place of all numbers, None if there is any. side_reason : of the only side without one.
-    whole : told of the take, not of its sides.
-    low_confidence : of an angle that the estimator's model gives; it has no norm. low_side : the only side of
-        which that is so, empty where it is of all that have a value.
-    symmetry : left against right in numbers, None unless both sides have one of enough strides.
-    change : since the visit before, of every side that has one; empty without such a visit.
+        its statistics; None without a comparable norm or with too few included strides on every side;
+        `norm_note` then gives the reason, if any. norm_group : reference group in words.
+    comfortable : norm at comfortable speed with its statistics, if `norm` is at the patient's speed;
+        otherwise None.
+    reason : replaces all numbers, None if there are any. side_reason : for the only side without one.
+    whole : applies to the trial, not to its sides.
+    low_confidence : angle estimated by a model, without a norm. low_side : the only side concerned, empty if
+        all sides with a value are.
+    symmetry : left against right in numbers, None unless both sides have enough strides.
+    change : since the previous visit, for every side with one; empty without such a visit.
     """
 
     name: str
@@ -123,14 +122,14 @@ class ParameterRow:
 
     @property
     def symmetry_words(self) -> str:
-        """Ratio, index and angle of the two sides in words; empty where they do not clearly differ."""
+        """Ratio, index and angle of the two sides in words; empty unless they clearly differ."""
         return "" if self.symmetry is None or not self.symmetry.clear else symmetry_words(self.symmetry)
 
     change: tuple[ChangeWords, ...] = ()
 
     @property
     def z_words(self) -> str:
-        """Standard deviations from the norm's mean, left and right; empty without a norm."""
+        """z-scores left and right, in words; empty without a norm."""
         cells = (self.both,) if self.both is not None else (self.left, self.right)
         if all(c is None or c.z is None for c in cells):
             return ""
@@ -138,7 +137,7 @@ class ParameterRow:
 
     @property
     def z_marks(self) -> tuple[tuple[str, bool], ...]:
-        """Standard deviations from the norm's mean as text and whether beyond what healthy people vary by."""
+        """z-scores as text and whether they exceed the normal range."""
         cells = (self.both,) if self.both is not None else (self.left, self.right)
         if all(c is None or c.z is None for c in cells):
             return ()
@@ -165,20 +164,20 @@ def parameter_rows(
     affected: Side | None = None,
     zero: Zero = "standing",
 ) -> tuple[ParameterRow, ...]:
-    """Rows in the order of the table; parameters without wording come last under their own name.
+    """Rows in table order; parameters without a label come last under their own name.
 
     Parameters
     ----------
-    affected : side that ratios are taken of, None = left over right.
-    zero : what the levels of joint angles are measured from.
+    affected : numerator of ratios, None = left over right.
+    zero : zero of joint angles.
     """
-    found: dict[str, dict[str | None, Parameter]] = {}
+    by_name: dict[str, dict[str | None, Parameter]] = {}
     for p in parameters:
-        found.setdefault(p.name, {})[p.side] = p
-    known = [name for name in CATALOGUE if name in found]
-    other = [name for name in found if name not in CATALOGUE]
-    rows = (_row(name, found[name], norms, affected, zero) for name in (*known, *other))
-    return tuple(_unsure(row, found[row.name]) for row in rows)
+        by_name.setdefault(p.name, {})[p.side] = p
+    ordered = [name for name in CATALOGUE if name in by_name]
+    unknown = [name for name in by_name if name not in CATALOGUE]
+    rows = (_row(name, by_name[name], norms, affected, zero) for name in (*ordered, *unknown))
+    return tuple(_unsure(row, by_name[row.name]) for row in rows)
 
 
 def group_rows(rows: Sequence[ParameterRow]) -> tuple[tuple[str, tuple[ParameterRow, ...]], ...]:
@@ -192,36 +191,40 @@ def _row(
 ) -> ParameterRow:
     term = parameter_term(name) if name in CATALOGUE else _unknown(name, sides)
     norm = norms.values.get(name)
-    both, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
-    missing = both is None and left is None and right is None
+    whole_trial, left, right = (_cell(sides.get(side), term, norms) for side in (None, "left", "right"))
+    missing = whole_trial is None and left is None and right is None
     symmetry = next(iter(compare_sides(tuple(sides.values()), affected)), None)
-    shown = norm if norm is not None and norm.comparable else None
-    few = shown is not None and not missing and all(c is None or c.few for c in (both, left, right))
-    shown = None if few else shown
-    usual = None if shown is None else norms.comfortable.get(name)
+    displayed_norm = norm if norm is not None and norm.comparable else None
+    few = (
+        displayed_norm is not None
+        and not missing
+        and all(c is None or c.few for c in (whole_trial, left, right))
+    )
+    displayed_norm = None if few else displayed_norm
+    usual = None if displayed_norm is None else norms.comfortable.get(name)
     usual = usual if usual is not None and usual.comparable else None
     absent = [side for side, cell in (("left", left), ("right", right)) if cell is None]
-    side_reason = _reason_of(sides.get(absent[0])) if len(absent) == 1 and both is None else None
-    told = None if side_reason is None else f"{absent[0]} {side_reason}"
+    side_reason = _reason_of(sides.get(absent[0])) if len(absent) == 1 and whole_trial is None else None
+    side_text = None if side_reason is None else f"{absent[0]} {side_reason}"
     return ParameterRow(
         name=name,
         title=title_of(name, term.label, zero),
         unit=term.unit,
         group=term.group,
-        both=both,
+        both=whole_trial,
         left=left,
         right=right,
-        difference=told or _difference(left, right, term, symmetry),
+        difference=side_text or _difference(left, right, term, symmetry),
         reason=_reason_of(next(iter(sides.values()))) if missing else None,
         scale=term.scale,
         side_reason=side_reason,
         whole=None in sides,
-        norm=_norm_text(shown, term),
-        norm_mean=None if shown is None else shown.mean,
-        norm_sd=None if shown is None else shown.sd,
-        norm_n=None if shown is None else shown.n,
-        norm_source=None if shown is None else shown.source,
-        norm_group=None if shown is None else GROUPS.get(shown.group, shown.group),
+        norm=_norm_text(displayed_norm, term),
+        norm_mean=None if displayed_norm is None else displayed_norm.mean,
+        norm_sd=None if displayed_norm is None else displayed_norm.sd,
+        norm_n=None if displayed_norm is None else displayed_norm.n,
+        norm_source=None if displayed_norm is None else displayed_norm.source,
+        norm_group=None if displayed_norm is None else GROUPS.get(displayed_norm.group, displayed_norm.group),
         norm_note=FEW_NOTE if few else "" if norm is None else norm.note,
         comfortable=_norm_text(usual, term),
         comfortable_mean=None if usual is None else usual.mean,
@@ -239,7 +242,7 @@ def _norm_text(norm: NormValue | None, term: Term) -> str | None:
 
 
 def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> ParameterRow:
-    """An angle of low confidence is held against nobody, nor against the other side; a measured side is."""
+    """Remove comparisons of low-confidence angles with norm and other side; measured sides keep theirs."""
     unsure = tuple(side for side, p in sides.items() if p.estimated and p.mean is not None)
     if not unsure:
         return row
@@ -247,7 +250,7 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
     def bare(side: Side | None, cell: TableCell | None) -> TableCell | None:
         return cell if cell is None or side not in unsure else replace(cell, z=None, percentile=None)
 
-    told = replace(
+    marked = replace(
         row,
         both=bare(None, row.both),
         left=bare("left", row.left),
@@ -258,9 +261,9 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
         symmetry=None,
     )
     if any(p.mean is not None for side, p in sides.items() if side not in unsure):
-        return told
+        return marked
     return replace(
-        told,
+        marked,
         norm=None,
         norm_mean=None,
         norm_sd=None,
@@ -279,7 +282,7 @@ def _unsure(row: ParameterRow, sides: Mapping[str | None, Parameter]) -> Paramet
 def _difference(
     left: TableCell | None, right: TableCell | None, term: Term, symmetry: Symmetry | None
 ) -> str | None:
-    """Words for left against right; None where too few strides are compared."""
+    """Words for left against right; None if too few strides are compared."""
     if left is None or right is None or symmetry is None:
         return None
     same = difference_words(left.value, right.value, term)
@@ -295,20 +298,20 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         return None
     digits = max(term.digits, 1)
     spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
-    what = name_counted(p.name)
-    counted = plural(p.n, what.removesuffix("s"), what)
-    told = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {counted}"]
+    cycle_name = name_counted(p.name)
+    cycles = plural(p.n, cycle_name.removesuffix("s"), cycle_name)
+    title_parts = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {cycles}"]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
-        told.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
+        title_parts.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
     if p.cv_pct is not None:
-        told.append(
-            f"CV {format_number(p.cv_pct, 1)} %{f' of few {what}' if p.note == 'few_strides' else ''}"
+        title_parts.append(
+            f"CV {format_number(p.cv_pct, 1)} %{f' of few {cycle_name}' if p.note == 'few_strides' else ''}"
         )
     enough = has_enough_values(p)
     place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
-        told.append(
+        title_parts.append(
             f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
         )
     return TableCell(
@@ -316,12 +319,12 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
         p.sd,
         p.n,
         format_number(p.mean, term.digits),
-        "; ".join(told),
+        "; ".join(title_parts),
         ci,
         p.cv_pct,
         place.z,
         place.percentile,
-        "" if enough else f"{p.n} {counted}",
+        "" if enough else f"{p.n} {cycles}",
         p.uncertainty,
         "" if p.uncertainty is None else format_uncertainty(p.uncertainty, term.digits),
         _known_by(p, term),
@@ -329,7 +332,7 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
 
 
 def _known_by(p: Parameter, term: Term) -> str:
-    """What the uncertainty is made of, in words; empty where it is not known."""
+    """Components of the uncertainty, in words; empty if unknown."""
     entry = CATALOGUE.get(p.name)
     if p.u_own is None or p.u_common is None or entry is None or entry.errors is None:
         return ""
@@ -352,7 +355,7 @@ def _sd_digits(term: Term) -> int:
 
 
 def _unknown(name: str, sides: Mapping[str | None, Parameter]) -> Term:
-    """A parameter that the wording does not know yet shows its own name."""
+    """Term for a parameter without a label: its own name."""
     values = [p.mean for p in sides.values() if p.mean is not None] or [0.0]
     low, high = min(*values, 0.0), max(*values, 1.0)
     unit = next(iter(sides.values())).unit

@@ -1,1 +1,1 @@
-"""How figures, findings and devices are named in sentences."""
+"""Wording of parameters, findings and devices in sentences."""

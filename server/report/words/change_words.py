@@ -1,4 +1,4 @@
-"""A change between two sessions in words: how much, beyond measurement error or not, relevant or not."""
+"""Wording of a change between two sessions: size, measurement error, clinical relevance."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ SCORE_TERMS: Final[Mapping[str, Term]] = {
 
 @dataclass(frozen=True)
 class ChangeWords:
-    """A change as a table or a chart says it.
+    """A change in words for tables and charts.
 
     Parameters
     ----------
-    size : "+0.22" or "0.00" in the unit of the figure. mark : "up" or "down" beyond the measurement error,
-        "" within it, "none" where no verdict is possible.
-    verdict : in words. limits : the limits behind it with their sources, in sentences.
-    about : what changed where that is not the number beside it, else "".
+    size : "+0.22" or "0.00" in the unit of the parameter. mark : "up" or "down" if larger than the
+        measurement error, "" if within it, "none" if not assessable.
+    verdict : in words. limits : underlying limits with their sources, in sentences.
+    about : the changed quantity if it differs from the displayed value, otherwise "".
     """
 
     side: str | None
@@ -56,28 +56,28 @@ class ChangeWords:
 
     @property
     def short(self) -> str:
-        """The verdict in two words where there are such."""
+        """The assessment in two words, if possible."""
         if self.mark in {"up", "down"}:
             return "changed"
         return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
 
 
 def find_term(name: str, unit: str = "") -> Term:
-    """How a figure is called; one without wording shows its own name."""
+    """Term of a parameter; its own name if it has no label."""
     if name in CATALOGUE:
         term = parameter_term(name)
         return replace(term, label=title_of(name, term.label))
-    known = SCORE_TERMS.get(name)
-    shown = "°" if unit == "deg" else unit
-    return known or Term(name, shown, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
+    score_term = SCORE_TERMS.get(name)
+    printed_unit = "°" if unit == "deg" else unit
+    return score_term or Term(name, printed_unit, "Other", 2, (0.0, 1.0), ("larger", "smaller"))
 
 
 def change_words(change: Change) -> ChangeWords:
-    """Say a change in words."""
+    """Describe a change in words."""
     term = find_term(change.name, change.unit)
     if change.difference is None:
-        said = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
-        return ChangeWords(change.side, "–", "none", said, limit_words(change))
+        text = NOT_ALIKE_WORDS if change.reason == NOT_MEASURED_ALIKE else "not measured in both"
+        return ChangeWords(change.side, "–", "none", text, limit_words(change))
     mark = "none" if change.verdict is None else ""
     if change.verdict in {"real_change", "clinically_relevant"}:
         mark = "up" if change.difference > 0 else "down"
@@ -87,37 +87,37 @@ def change_words(change: Change) -> ChangeWords:
 
 
 def format_difference(difference: float, term: Term) -> str:
-    """A difference with its sign, "+0.22"; without one where it rounds to nothing."""
+    """A difference with its sign, "+0.22"; without sign if it rounds to zero."""
     text = format_number(difference, term.digits)
     return f"+{text}" if difference > 0 and float(f"{difference:.{term.digits}f}") else text
 
 
 def limit_words(change: Change) -> tuple[str, ...]:
-    """The limits of a figure with their sources, whoever they were found on."""
+    """Limits of a parameter with their sources, for any population."""
     term = find_term(change.name, change.unit)
     unit = "" if not term.unit else term.unit if term.unit in "°%" else f"\u202f{term.unit}"
-    said = []
+    sentences = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        said.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
+        sentences.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
     if change.mcid is not None:
-        said.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
-    return tuple(said)
+        sentences.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
+    return tuple(sentences)
 
 
 def format_limit(limit: float, term: Term) -> str:
-    """A limit of change without its unit: a decimal more than tenths need, metres in millimetres."""
+    """A limit of change without its unit: one decimal more than for tenths, metres in millimetres."""
     return format_number(limit, max(term.digits, 3 if term.unit == "m" else 1))
 
 
 def _verdict(change: Change) -> str:
     if change.verdict is None:
         return {TOO_FEW: TOO_FEW_WORDS, UNLIKE: UNLIKE_WORDS}.get(change.reason or "", NO_LIMIT)
-    said = VERDICTS[change.verdict]
+    text = VERDICTS[change.verdict]
     if change.verdict == "real_change" and change.mcid is not None:
-        said += ", smaller than clinically relevant"
+        text += ", smaller than clinically relevant"
     if change.verdict != "within_measurement_error" and change.towards_norm is not None:
-        said += ", towards the norm" if change.towards_norm else ", away from the norm"
+        text += ", towards the norm" if change.towards_norm else ", away from the norm"
     if change.note == "from_standing":
-        said += "; includes how the person stood"
-    return said
+        text += "; includes how the person stood"
+    return text

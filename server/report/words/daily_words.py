@@ -1,6 +1,6 @@
-"""What daily life is called: its kinds and transitions in words, durations, times of day and days.
+"""Wording of daily life: activities and transitions, durations, times of day and days.
 
-Without a clock hours and days count from the first sample.
+Without a clock, hours and days are counted from the first sample.
 """
 
 from __future__ import annotations
@@ -78,20 +78,22 @@ def format_hours(minutes: float) -> str:
     return f"{whole // 60}:{whole % 60:02d}"
 
 
-def find_midnight(found: ActivityResult, at_s: float) -> float:
-    """Where the day of a moment begins, s from the first sample (below 0 on the first day of a clock)."""
-    return float(np.floor((at_s + _since_midnight(found)) / DAY_S) * DAY_S - _since_midnight(found))
+def find_midnight(activity: ActivityResult, at_s: float) -> float:
+    """Start of the day that contains a time, s from the first sample (negative on the first day of a
+    clock).
+    """
+    return float(np.floor((at_s + _since_midnight(activity)) / DAY_S) * DAY_S - _since_midnight(activity))
 
 
-def clock_label(found: ActivityResult, at_s: float) -> str:
+def clock_label(activity: ActivityResult, at_s: float) -> str:
     """Time of day as "14:05", or hours and minutes since the first sample without a clock."""
-    minutes = int((at_s + _since_midnight(found)) // 60)
+    minutes = int((at_s + _since_midnight(activity)) // 60)
     return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}"
 
 
-def find_day_label(found: ActivityResult, at_s: float) -> str:
-    """Name of the day of a moment, empty outside all days."""
-    for i, d in enumerate(found.days):
+def find_day_label(activity: ActivityResult, at_s: float) -> str:
+    """Name of the day that contains a time, empty outside all days."""
+    for i, d in enumerate(activity.days):
         if d.start_s <= at_s < d.end_s:
             return day_label(i, d.date)
     return ""
@@ -102,6 +104,10 @@ def day_label(number: int, date: dt.date | None) -> str:
     return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
 
 
-def _since_midnight(found: ActivityResult) -> float:
-    at = found.started_at
-    return 0.0 if at is None else at.hour * HOUR_S + at.minute * 60.0 + at.second + at.microsecond * 1e-6
+def _since_midnight(activity: ActivityResult) -> float:
+    start = activity.started_at
+    return (
+        0.0
+        if start is None
+        else start.hour * HOUR_S + start.minute * 60.0 + start.second + start.microsecond * 1e-6
+    )

@@ -1,4 +1,4 @@
-"""What is said of a sensor by its checks: a verdict, why, what to do (docs/science/devices.md, "Limits")."""
+"""Wording of sensor checks: assessment, reasons and remedies (docs/science/devices.md, "Limits")."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ ADVICE: Final = {
 
 @dataclass(frozen=True)
 class DeviceVerdict:
-    """What people read of a sensor.
+    """Assessment of a sensor in words.
 
     Parameters
     ----------
-    kind : look of the state, "ok", "warn" or "none". reasons : sentences, each with what to do.
+    kind : style of the state, "ok", "warn" or "none". reasons : sentences, each with a remedy.
     """
 
     kind: str
@@ -47,18 +47,18 @@ class DeviceVerdict:
 def judge_device(
     course: DeviceCourse, checks: Sequence[DeviceCheck], days: Sequence[dt.date]
 ) -> DeviceVerdict:
-    """Put a course in words; `checks` and their `days` are the ones it was followed over."""
+    """Describe the history of a sensor; `checks` and their `days` are those it was computed from."""
     if course.newest is None:
         return DeviceVerdict("none", "Not measured", (NOT_MEASURED[checks[-1].reason or "no_rest"],))
     late: tuple[str, ...] = ()
     if checks[-1].reason is not None:
-        said = NOT_MEASURED[checks[-1].reason]
-        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {said}",)
+        cause = NOT_MEASURED[checks[-1].reason]
+        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {cause}",)
     if course.findings:
-        told = [_tell(f, days) for f in course.findings]
-        others = ["" if what == told[0] else f"{what}. " for what in told]
-        reasons = [f"{what}{ADVICE[f.quantity]}" for what, f in zip(others, course.findings, strict=True)]
-        return DeviceVerdict("warn", told[0], (*reasons, *late))
+        texts = [_tell(f, days) for f in course.findings]
+        prefixes = ["" if text == texts[0] else f"{text}. " for text in texts]
+        reasons = [f"{text}{ADVICE[f.quantity]}" for text, f in zip(prefixes, course.findings, strict=True)]
+        return DeviceVerdict("warn", texts[0], (*reasons, *late))
     if course.compared == 0:
         return DeviceVerdict("none", "First check", ("There is nothing to compare with yet.", *late))
     return DeviceVerdict("ok", "Steady", late)
@@ -79,5 +79,5 @@ def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
     if f.quantity == "scale_off":
         way = "much" if f.value > 0 else "little"
         return f"Gravity reads {format_number(100 * abs(f.value), 1)} % too {way}"
-    what = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
-    return f"{what} noise {format_number(f.value, 1)} times its usual{since}"
+    sensor_kind = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
+    return f"{sensor_kind} noise {format_number(f.value, 1)} times its usual{since}"

@@ -1,4 +1,4 @@
-"""Which pose estimator ran, on what, and what it measured about itself, in words."""
+"""Wording of the pose estimator, its input, and its self-assessment."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ HIDDEN: Final = ("min_eigenvalue",)
 
 @dataclass(frozen=True)
 class HealthRow:
-    """One measured quantity: the worst of its kind and where, its limit, and the verdict."""
+    """One health measure: worst value and its location, limit, and result."""
 
     label: str
     where: str
@@ -75,10 +75,10 @@ class EstimatorView:
 
     Parameters
     ----------
-    kind, verdict : ok, warn or bad and its word. reduced : words, None when the take allowed what is worn.
-    choices : (value, words, asked for now) of what can be asked for on these sensors.
-    estimated : sentence about angles that no two sensors measure, empty when there are none.
-    paper : where the method comes from; None = our own, or one that this version does not know.
+    kind, verdict : ok, warn or bad and its word. reduced : words, None if all sensors could be used.
+    choices : (value, words, selected) of estimators available for these sensors.
+    estimated : sentence about estimated angles, empty if there are none.
+    paper : reference of the method; None = our own, or unknown to this version.
     """
 
     name: str
@@ -94,23 +94,23 @@ class EstimatorView:
 
 
 def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
-    """View of `estimator` in analysis.json; None when the analysis stopped before the poses."""
+    """View of `estimator` in analysis.json; None if the analysis stopped before the poses."""
     if e is None:
         return None
-    name, verdict, asked = str(e["name"]), str(e["verdict"]), str(e["requested"])
+    name, verdict, requested = str(e["name"]), str(e["verdict"]), str(e["requested"])
     reduced = e["reduced"]
-    judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
+    is_judged = any(f["warn"] is not None or f["bad"] is not None for f in e["health"])
     return EstimatorView(
         name=method_label(name),
         meaning=_method_note(name),
         sensors=len(e["sensors"]),
         kind=KINDS[verdict],
-        verdict=VERDICTS[verdict] if judged else NOT_JUDGED,
+        verdict=VERDICTS[verdict] if is_judged else NOT_JUDGED,
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(
-            (AUTO, "Automatic: the best for what is worn", asked == AUTO),
-            *((x, choice_label(x), asked == x) for x in e["possible"]),
+            (AUTO, "Automatic: the best for what is worn", requested == AUTO),
+            *((x, choice_label(x), requested == x) for x in e["possible"]),
         ),
         estimated=_estimated(_told(list_estimated_angles(e), name)),
         paper=BY_METHOD[name].paper if name in BY_METHOD else None,
@@ -118,33 +118,33 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
 
 
 def method_label(method: str) -> str:
-    """Name of `Poses.method` as people read it; one that this version does not know as it is."""
-    known = BY_METHOD.get(method)
-    return known.label if known is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
+    """Label of `Poses.method`; unchanged if unknown to this version."""
+    estimator = BY_METHOD.get(method)
+    return estimator.label if estimator is not None else NO_FIGURE_LABEL if method == NO_FIGURE else method
 
 
 def choice_label(name: str) -> str:
-    """What a form offers as this estimator; one that this version does not know as it is."""
+    """Label of an estimator in forms; unchanged if unknown to this version."""
     return BY_NAME[name].choice if name in BY_NAME else name
 
 
 def _method_note(method: str) -> str:
-    known = BY_METHOD.get(method)
-    return known.note if known is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
+    estimator = BY_METHOD.get(method)
+    return estimator.note if estimator is not None else NO_FIGURE_NOTE if method == NO_FIGURE else ""
 
 
 def list_estimated_angles(e: Mapping[str, Any] | None) -> frozenset[str]:
-    """Angles with their side that the estimator's model gives rather than two sensors."""
+    """Angles with their side that are estimated by a model rather than measured by two sensors."""
     return frozenset() if e is None else frozenset(e["estimated_angles"])
 
 
 def list_estimated_variables(e: Mapping[str, Any] | None) -> frozenset[str]:
-    """The same without the side."""
+    """Estimated variables without the side."""
     return frozenset(a.removesuffix("_l").removesuffix("_r") for a in list_estimated_angles(e))
 
 
 def _told(angles: frozenset[str], method: str) -> frozenset[str]:
-    """Those that are a result: not what the model holds fixed."""
+    """Angles that are results rather than fixed by the model."""
     fixed = BY_METHOD[method].fixed if method in BY_METHOD else ()
     return frozenset(a for a in angles if a.removesuffix("_l").removesuffix("_r") not in fixed)
 
@@ -155,23 +155,23 @@ def _estimated(angles: frozenset[str]) -> str:
     joints = sorted({a.split("_")[0] for a in angles})
     sides = {"l": "left", "r": "right"}
     on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
-    who = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
+    region = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
     return (
-        f"{', '.join(joints).capitalize()} angles of {who} are estimated by the leg model, not measured by "
-        "two sensors: low confidence."
+        f"{', '.join(joints).capitalize()} angles of {region} are estimated by the leg model, not measured "
+        "by two sensors: low confidence."
     )
 
 
 def _rows(health: list[Mapping[str, Any]]) -> tuple[HealthRow, ...]:
-    """The worst finding of each name, judged ones first."""
+    """The worst value of each measure, assessed ones first."""
     worst: dict[str, Mapping[str, Any]] = {}
     for f in health:
         was = worst.get(f["name"])
         if was is None or f["value"] is None or (was["value"] is not None and f["value"] > was["value"]):
             worst[f["name"]] = f
-    shown = [f for name, f in worst.items() if name not in HIDDEN]
-    shown.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
-    return tuple(_row(f) for f in shown)
+    measures = [f for name, f in worst.items() if name not in HIDDEN]
+    measures.sort(key=lambda f: f["warn"] is None and f["bad"] is None)
+    return tuple(_row(f) for f in measures)
 
 
 def _row(f: Mapping[str, Any]) -> HealthRow:
@@ -179,10 +179,10 @@ def _row(f: Mapping[str, Any]) -> HealthRow:
     label, digits, unit = QUANTITIES.get(name, (name.replace("_", " ").capitalize(), 2, ""))
     gap = "" if unit == "°" else "\u202f"
     limit = f["bad"] if f["warn"] is None else f["warn"]
-    where = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
+    location = " and ".join(place_words(part) for part in str(f["of"] or "").split("-") if part)
     return HealthRow(
         label=label,
-        where=where,
+        where=location,
         text="not measured"
         if f["value"] is None
         else f"{format_number(float(f['value']), digits)}{gap}{unit}",

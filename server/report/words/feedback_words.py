@@ -1,4 +1,4 @@
-"""A prescription of biofeedback in words: what is trained, the target, what is shown when, when it ends."""
+"""Wording of a biofeedback prescription: parameter, target, modes, schedule and end."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def name_target(content: Prescription) -> str:
 
 
 def side_words(side: Side | None) -> str:
-    """Which side is trained."""
+    """Trained side in words."""
     return "both sides" if side is None else side
 
 
@@ -42,7 +42,7 @@ def format_quantity(value: float, term: Term, digits: int | None = None) -> str:
 
 
 def digits_of(content: Prescription) -> int:
-    """Decimals of values beside the target: one more than the table has where its sd would hardly show."""
+    """Decimals of values next to the target: one more than in tables if the sd would hardly be visible."""
     digits, sd = CATALOGUE[content.parameter].digits, content.target.sd
     return digits + 1 if sd is not None and sd < 5.0 * 10.0**-digits else digits
 
@@ -53,12 +53,12 @@ def target_words(content: Prescription) -> str:
     if t.mean is None or t.sd is None:
         return SOURCE_WORDS[t.source]
     digits = digits_of(content)
-    who = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
-    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {who}"
+    origin = "entered" if t.source == "manual" else t.words or SOURCE_WORDS[t.source]
+    return f"{format_number(t.mean, digits)} ± {format_quantity(t.sd, term, digits)}, {origin}"
 
 
 def prescription_words(content: Prescription) -> list[tuple[str, str]]:
-    """The record as label and text, in reading order."""
+    """The prescription as label and text, in display order."""
     return [
         ("Trained", name_target(content)),
         ("Target", target_words(content)),
@@ -72,20 +72,20 @@ def prescription_words(content: Prescription) -> list[tuple[str, str]]:
 
 
 def schedule_words(content: Prescription) -> str:
-    """Which strides get feedback."""
+    """Schedule of strides with feedback, in words."""
     s = content.schedule
     if s.kind == "every":
-        said = "every stride"
+        text = "every stride"
     else:
         shares = " → ".join(f"{p}{NBSP}%" for p in s.shares_pct)
-        said = f"{shares} of the strides"
+        text = f"{shares} of the strides"
         if len(s.shares_pct) > 1:
-            said = f"{shares} of the strides, {s.strides_per_share} strides each"
+            text = f"{shares} of the strides, {s.strides_per_share} strides each"
     if s.probe_every is not None:
-        said += f"; after every {s.probe_every}, {s.probe_strides} without"
+        text += f"; after every {s.probe_every}, {s.probe_strides} without"
     if s.retention_strides:
-        said += f"; a visit after a training begins with {s.retention_strides} without"
-    return said
+        text += f"; a visit after a training begins with {s.retention_strides} without"
+    return text
 
 
 def _zone(content: Prescription) -> str:
@@ -93,10 +93,10 @@ def _zone(content: Prescription) -> str:
 
 
 def _shown(content: Prescription) -> str:
-    said = ", ".join(MODE_WORDS[m] for m in content.modes)
+    text = ", ".join(MODE_WORDS[m] for m in content.modes)
     if content.positive_only:
-        return f"{said}; only strides in the zone"
-    return f"{said}; only strides outside the zone" if content.bandwidth else said
+        return f"{text}; only strides in the zone"
+    return f"{text}; only strides outside the zone" if content.bandwidth else text
 
 
 def _level(content: Prescription) -> str:
@@ -112,22 +112,22 @@ def _level(content: Prescription) -> str:
 
 def _ends(content: Prescription) -> str:
     r = content.stop_rule
-    said = []
+    conditions = []
     if r.max_minutes is not None:
-        said.append(f"after {r.max_minutes:g} min")
+        conditions.append(f"after {r.max_minutes:g} min")
     if r.max_strides is not None:
-        said.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
+        conditions.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
     if r.gps_rise_deg is not None:
-        said.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
-    return ", ".join(said) or "when the therapist ends it"
+        conditions.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
+    return ", ".join(conditions) or "when the therapist ends it"
 
 
 def _watched(content: Prescription) -> str:
     g, term = content.guard, parameter_term(content.parameter)
-    said = []
+    parts = []
     if content.side is not None:
         limit = "its MDC" if g.other_change is None else format_quantity(g.other_change, term)
-        said.append(f"a change of the other side by {limit}")
+        parts.append(f"a change of the other side by {limit}")
     if g.gps_rise_deg is not None:
-        said.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")
-    return ", ".join(said) or "nothing"
+        parts.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")
+    return ", ".join(parts) or "nothing"

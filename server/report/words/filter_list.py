@@ -1,4 +1,4 @@
-"""The orientation filters one can ask for, in words: engines, grades, who needs a magnetometer."""
+"""Available orientation filters in words: engines, grades, use of magnetometers."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ PROPOSED: Final = (
 
 @dataclass(frozen=True)
 class ListedFilter:
-    """A filter as forms offer it.
+    """A filter as offered in forms.
 
     Parameters
     ----------
-    name : as it is asked for. label : as it is shown; a reconstruction says so. engine : its group.
-    grade : how sure its equations are, None for our own. magnetometer : needed, optional or unused.
+    name : identifier. label : display name, which marks reconstructions. engine : its group.
+    grade : certainty of its equations, None for our own. magnetometer : needed, optional or unused.
     """
 
     name: str
@@ -42,7 +42,7 @@ class ListedFilter:
 
     @property
     def remark(self) -> str:
-        """Grade, and what a magnetometer is to it where that is not the rule."""
+        """Grade, and use of a magnetometer if unusual."""
         grade = None if self.grade is None else GRADES_IN_WORDS[self.grade]
         return ", ".join(x for x in (grade, NEEDS.get(self.magnetometer)) if x)
 
@@ -61,5 +61,5 @@ FILTERS: Final = (
 
 
 def list_engines() -> list[tuple[str, str, list[ListedFilter]]]:
-    """Engine, its words, its filters, in reading order."""
+    """Engines with label and filters, in display order."""
     return [(e, words, [f for f in FILTERS if f.engine == e]) for e, words in ENGINE_WORDS.items()]

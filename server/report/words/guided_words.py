@@ -1,4 +1,4 @@
-"""What the person of a guided functional test is told, on every screen."""
+"""Instructions for the subject of a guided functional test, on all screens."""
 
 from __future__ import annotations
 
@@ -65,5 +65,5 @@ OVER: Final = "The test is over. You may rest."
 
 
 def tell_person(protocol: str, phase: str) -> str:
-    """What to do now, by protocol and phase (core/functional_tests/guided.py)."""
+    """Current instruction, by protocol and phase (core/functional_tests/guided.py)."""
     return SAYS[protocol].get(phase, OVER)

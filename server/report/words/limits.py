@@ -1,4 +1,4 @@
-"""Values against limits and where the limits come from: no diagnosis (docs/science/flags.md)."""
+"""Comparison of values with limits and the sources of the limits; not a diagnosis (docs/science/flags.md)."""
 
 from __future__ import annotations
 
@@ -53,12 +53,12 @@ UNITS: Final[Mapping[str, tuple[str, int]]] = {"deg": ("°", 0), "m": ("\u202fm"
 
 @dataclass(frozen=True)
 class LimitRow:
-    """One rule on one side.
+    """One rule for one side.
 
     Parameters
     ----------
-    measure : name of what is held against the limit.
-    kind : "warn" beyond its limit, "bad" beyond a second one too, "ok" within, "none" not to be said.
+    measure : name of the measured quantity.
+    kind : "warn" outside the limit, "bad" outside a second one, "ok" within, "none" not assessable.
     """
 
     name: str
@@ -73,7 +73,7 @@ class LimitRow:
 
 @dataclass(frozen=True)
 class LimitsView:
-    """Rows beyond their limits, rows within, and rows that cannot be judged."""
+    """Rows outside their limits, rows within, and rows that cannot be assessed."""
 
     beyond: tuple[LimitRow, ...]
     within: tuple[LimitRow, ...]
@@ -81,7 +81,7 @@ class LimitsView:
 
 
 def limits_view(flags: Sequence[Flag]) -> LimitsView:
-    """All rules, those beyond their limit first."""
+    """All rules, those outside their limit first."""
     rows = [_row(f) for f in flags]
     return LimitsView(
         beyond=tuple(r for r in rows if r.kind in ("warn", "bad")),

@@ -1,4 +1,4 @@
-"""How variables, parameters, reasons and differences are called in front of people."""
+"""User-visible names of variables, parameters, reasons and differences."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import Comparison, find_entry
 from sagittal.core.parameters.kinematic import is_level
 from sagittal.core.parameters.symmetry import Symmetry
-from sagittal.web.user_text import UserText
+from sagittal.core.user_text import UserText
 
 Plane = Literal["sagittal", "frontal", "transverse"]
 
@@ -22,7 +23,7 @@ class Variable:
     Parameters
     ----------
     label : title of its chart. y_range, ticks : degrees, the same in all sessions.
-    up, down : words at the two ends of the axis.
+    up, down : labels of the two ends of the axis.
     """
 
     name: str
@@ -72,7 +73,7 @@ Ranges are those customary in gait reports, wider where an angle from standing g
 
 @dataclass(frozen=True)
 class Term:
-    """A parameter or a score as the table shows it.
+    """Label of a parameter or score in tables.
 
     Parameters
     ----------
@@ -89,7 +90,7 @@ class Term:
 
 
 def parameter_term(name: str) -> Term:
-    """How a parameter or a figure of a rule is shown; KeyError for a name the catalogue does not have."""
+    """Term of a parameter or rule; KeyError for an unknown name."""
     e = find_entry(name)
     if e is None:
         raise KeyError(name)
@@ -106,7 +107,7 @@ ZERO_WORDS: Final[Mapping[str, str]] = {
 
 
 def title_of(name: str, label: str, zero: str = "standing") -> str:
-    """Title of a parameter: a level says what it is measured from, so that no two figures share a name."""
+    """Title of a parameter; angles include their zero, so that titles are unique."""
     return f"{label}, {ZERO_WORDS[zero]}" if is_level(name) else label
 
 
@@ -199,23 +200,25 @@ NO_NORM: Final[Mapping[str, str]] = {
 
 
 def reason_words(code: str | None) -> str:
-    """Words for a missing number; a code without words shows itself."""
+    """Text for a missing number; an unknown code is returned unchanged."""
     return "not measured" if code is None else REASONS.get(code, f"not measured: {code.replace('_', ' ')}")
 
 
 def place_words(sensor: str) -> str:
-    """A segment in words, "right shank"; a device id as it is."""
+    """Name of a segment, "right shank"; a device id unchanged."""
     name, _, suffix = sensor.rpartition("_")
     side = {"l": "left", "r": "right"}.get(suffix)
     return sensor if side is None or not name else f"{side} {name}"
 
 
 def speak_places(text: str) -> str:
-    """A sentence with its segments in words.
+    """Replace segment codes in a sentence by their names.
 
     >>> speak_places("Units of shank_r and foot_l; columns shank_l_qw stay.")
     'Units of right shank and left foot; columns shank_l_qw stay.'
     """
+    if isinstance(text, Message):
+        return text.map_words(speak_places)
     return _SIDED.sub(lambda found: place_words(found[0]), text)
 
 
@@ -231,47 +234,49 @@ NOT_COUNTED: Final[Mapping[str, str]] = {
 
 
 def explain_repetition(code: str) -> str:
-    """Words for a squat left out."""
+    """Reason for excluding a squat."""
     return NOT_COUNTED.get(code, code)
 
 
 def explain_exclusion(code: str) -> str:
-    """Words for a stride left out; a therapist's own reason is shown as typed."""
+    """Reason for excluding a stride; a therapist's own reason is returned as typed."""
     if code.startswith("manual:"):
         return UserText(code.removeprefix("manual:").strip())
     return EXCLUDED.get(code, code)
 
 
 def format_number(value: float, digits: int = 0) -> str:
-    """A number with a real minus sign and without a negative zero."""
+    """A number with a true minus sign and without a negative zero."""
     text = f"{value:.{digits}f}"
     return text.removeprefix("-") if float(text) == 0 else text.replace("-", "−")
 
 
 def format_uncertainty(value: float, digits: int) -> str:
-    """What a number of so many digits is known to, with up to two more digits where it would be 0.
+    """Uncertainty of a number with this many decimals, using up to two more if it would round to 0.
 
     >>> format_uncertainty(2.4, 0), format_uncertainty(0.08, 0)
     ('± 2', '± 0.1')
     """
-    shown = next((d for d in range(digits, digits + 3) if round(value, d)), digits)
-    return f"± {format_number(value, shown)}"
+    decimals = next((d for d in range(digits, digits + 3) if round(value, d)), digits)
+    return f"± {format_number(value, decimals)}"
 
 
 def symmetry_words(s: Symmetry) -> str:
-    """The indices of two sides with what they put first; "" for angles, whose difference says it all."""
+    """Symmetry indices of two sides with their reference; "" for angles, for which the difference
+    suffices.
+    """
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
-    first, other = s.reference.split("/")
+    first, second = s.reference.split("/")
     return (
-        f"{first} / {other} {format_number(s.ratio, 2)}, "
+        f"{first} / {second} {format_number(s.ratio, 2)}, "
         f"symmetry index {_signed(s.index_pct)} % (positive: {first} "
         f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
     )
 
 
 def _signed(value: float, digits: int = 1) -> str:
-    """A number that always carries its sign, unless it rounds to 0."""
+    """A number that always has a sign, unless it rounds to 0."""
     text = format_number(value, digits)
     return f"+{text}" if value > 0 and float(f"{value:.{digits}f}") else text
 
@@ -280,9 +285,9 @@ NO_DIFFERENCE: Final = "no difference"
 
 
 def round_difference(left: float, right: float, term: Term) -> float:
-    """How far apart two values are that are printed side by side, so that whoever subtracts them agrees.
+    """Difference of two displayed values, consistent with their rounding.
 
-    Angles are compared in whole degrees: tenths are far below what repeats between visits.
+    Angles are compared in whole degrees, since tenths are far below the repeatability between visits.
     """
     digits = _difference_digits(term)
     if term.unit != "°":
@@ -297,11 +302,11 @@ def _difference_digits(term: Term) -> int:
 def difference_words(left: float, right: float, term: Term) -> str:
     """Left against right in words: "left longer by 0.04 s", "no difference" where printed values agree."""
     digits = _difference_digits(term)
-    shown = round_difference(left, right, term)
-    if shown == 0:
+    difference = round_difference(left, right, term)
+    if difference == 0:
         return NO_DIFFERENCE
     unit = {"%": " points", "°": "°"}.get(term.unit, f"\u202f{term.unit}")
-    return f"left {term.comparison[0 if left > right else 1]} by {format_number(shown, digits)}{unit}"
+    return f"left {term.comparison[0 if left > right else 1]} by {format_number(difference, digits)}{unit}"
 
 
 JUDGED: Final[Mapping[str | None, str]] = {

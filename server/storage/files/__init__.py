@@ -1,1 +1,1 @@
-"""Stored files: in a folder or in a bucket, opened, moved, discarded."""
+"""Stored files in a folder or a bucket: open, move, discard."""

@@ -1,8 +1,8 @@
-"""Blobs in a bucket of any store that speaks S3: objects `<prefix>/blobs/<space>/<sha256>`.
+"""Blobs in an S3-compatible bucket: objects `<prefix>/blobs/<space>/<sha256>`.
 
-A file is received into the local folder `incoming` and put from there; it is acknowledged when the bucket has
-confirmed it. Whatever keeps the bucket from answering is StoreAway, within seconds: nothing is known then, so
-nothing is taken for missing. One prefix belongs to one clinic.
+A file is received into the local folder `incoming` and uploaded from there; it is acknowledged when the
+bucket has confirmed it. Any failure to reach the bucket raises StoreAway within seconds, so that files are
+not mistaken for missing. One prefix belongs to one clinic.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class BucketBlobs(BlobStore):
     Parameters
     ----------
     url : s3://name/prefix. incoming : local folder in which files are received.
-    note : called when the bucket has taken a file, before that is acknowledged.
+    note : called when the bucket has stored a file, before it is acknowledged.
 
     Raises
     ------
@@ -67,7 +67,7 @@ class BucketBlobs(BlobStore):
         self._note()
 
     def probe(self) -> None:
-        """See BlobStore; the bucket is asked for all that a clinic needs of it."""
+        """See BlobStore; tests all operations that a clinic requires of the bucket."""
         self._brief.put(_PROBE, b"probe")
         self._brief.load(_PROBE)
         next(self._brief.list(_BLOBS), None)
@@ -77,14 +77,14 @@ class BucketBlobs(BlobStore):
             file.write(bytes(4096))
 
     def keeps_versions(self) -> bool:
-        """Whether the bucket keeps what is removed: who was erased would still be in it."""
+        """Whether the bucket keeps versions of removed objects, including erased patients."""
         version = self._brief.put(_PROBE, b"probe")
         self._brief.delete([_PROBE])
         return version not in {None, "null"}
 
     def is_empty(self) -> bool:
-        """Whether there is no object at all under the prefix, but for what a killed `probe` left."""
-        return all(found["path"] == _PROBE for found in self._bucket.list(""))
+        """Whether there are no objects under the prefix, except the remains of a killed `probe`."""
+        return all(entry["path"] == _PROBE for entry in self._bucket.list(""))
 
     def _load(self, space: str, sha256: str) -> bytes | None:
         return self._bucket.load(_key(space, sha256))
@@ -107,15 +107,15 @@ class BucketBlobs(BlobStore):
         return self._brief.find(_key(space, sha256)) is not None
 
     def _stored(self) -> Iterator[BlobFile]:
-        for found in self._bucket.list(_BLOBS):
-            space, _, name = found["path"].removeprefix(_BLOBS).partition("/")
+        for entry in self._bucket.list(_BLOBS):
+            space, _, name = entry["path"].removeprefix(_BLOBS).partition("/")
             with contextlib.suppress(ValueError):  # an object of somebody else's is passed over
                 check_address(space, name)
-                yield BlobFile(space, name, _age_s(found["last_modified"]))
+                yield BlobFile(space, name, _age_s(entry["last_modified"]))
 
     def _age_of(self, one: BlobFile) -> float | None:
-        found = self._brief.find(f"{_BLOBS}{one.space}/{one.name}")
-        return None if found is None else _age_s(found["last_modified"])
+        entry = self._brief.find(f"{_BLOBS}{one.space}/{one.name}")
+        return None if entry is None else _age_s(entry["last_modified"])
 
     def remove(self, space: str, *names: str) -> None:
         """See BlobStore."""
@@ -124,10 +124,10 @@ class BucketBlobs(BlobStore):
     def erase(self, space: str) -> None:
         """See BlobStore."""
         folder = _key(space, "0" * 64).rpartition("/")[0]
-        self._bucket.delete([found["path"] for found in self._bucket.list(f"{folder}/")])
+        self._bucket.delete([entry["path"] for entry in self._bucket.list(f"{folder}/")])
 
     def settle(self, spaces: Iterable[str]) -> None:
-        """See BlobStore; an answer of the bucket is final."""
+        """See BlobStore; responses of the bucket are final."""
         fs.sync_folder(self.incoming)
 
 
@@ -140,29 +140,29 @@ class BucketTrash(Trash):
 
     def files(self) -> Iterator[TrashedFile]:
         """See Trash."""
-        for found in self._bucket.list(_TRASH):
-            one = parse_way(found["path"].removeprefix(_TRASH), found["size"])
+        for entry in self._bucket.list(_TRASH):
+            one = parse_way(entry["path"].removeprefix(_TRASH), entry["size"])
             if one is not None:
                 yield one
 
-    def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; the copies are made."""
-        for space, name in found:
-            self._bucket.copy(f"{_BLOBS}{space}/{name}", _way(space, name, at))
+    def prepare(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; creates the copies."""
+        for space, name in addresses:
+            self._bucket.copy(f"{_BLOBS}{space}/{name}", _way(space, name, time))
 
-    def take(self, found: Collection[Address], at: dt.datetime) -> None:
+    def take(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash."""
-        self._brief.delete([f"{_BLOBS}{space}/{name}" for space, name in found])
+        self._brief.delete([f"{_BLOBS}{space}/{name}" for space, name in addresses])
 
-    def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; the copies go."""
-        self._bucket.delete([_way(space, name, at) for space, name in found])
+    def forget(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; deletes the copies."""
+        self._bucket.delete([_way(space, name, time) for space, name in addresses])
 
-    def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; an answer of the bucket is final."""
+    def settle(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; responses of the bucket are final."""
 
     def receive(self, one: TrashedFile, path: Path) -> None:
-        """Take over a local file that lies in the trash of a folder."""
+        """Upload a local file from the trash of a folder."""
         self._bucket.put(_TRASH + one.way, path)
 
     def put_back(self, one: TrashedFile) -> None:
@@ -179,12 +179,12 @@ class BucketTrash(Trash):
 
     def remove(self, space: str, names: Iterable[str] | None = None) -> None:
         """See Trash."""
-        wanted = None if names is None else set(names)
-        self.drop([f for f in self.files() if f.space == space and (wanted is None or f.name in wanted)])
+        selected = None if names is None else set(names)
+        self.drop([f for f in self.files() if f.space == space and (selected is None or f.name in selected)])
 
-    def drop(self, found: Collection[TrashedFile]) -> None:
+    def drop(self, trashed: Collection[TrashedFile]) -> None:
         """See Trash."""
-        self._bucket.delete([_TRASH + one.way for one in found])
+        self._bucket.delete([_TRASH + one.way for one in trashed])
 
     def tidy(self) -> None:
         """See Trash; there are no folders."""
@@ -205,9 +205,9 @@ def _key(space: str, sha256: str) -> str:
     return _BLOBS + check_address(space, sha256)
 
 
-def _way(space: str, name: str, at: dt.datetime) -> str:
-    return f"{_TRASH}{name_stamp(at)}/{space}/{name}"
+def _way(space: str, name: str, time: dt.datetime) -> str:
+    return f"{_TRASH}{name_stamp(time)}/{space}/{name}"
 
 
-def _age_s(at: dt.datetime) -> float:
-    return (dt.datetime.now(dt.UTC) - at).total_seconds()
+def _age_s(time: dt.datetime) -> float:
+    return (dt.datetime.now(dt.UTC) - time).total_seconds()

@@ -24,11 +24,11 @@ from sagittal.server.storage.files.trash import FolderTrash
 
 
 class FolderBlobs(BlobStore):
-    """The folder of all blobs.
+    """Folder of all blobs.
 
     Parameters
     ----------
-    root : made if absent; the trash is beside it.
+    root : created if absent; the trash is in the same parent folder.
     """
 
     moved_at_once: ClassVar[int] = 100
@@ -84,11 +84,11 @@ class FolderBlobs(BlobStore):
         return self.path(space, sha256).is_file()
 
     def path(self, space: str, sha256: str) -> Path:
-        """Where a blob lives."""
+        """Path of a blob."""
         return self.root / check_address(space, sha256)
 
     def find_path(self, one: BlobFile) -> Path:
-        """Where a file lies that was found here; its name may be any."""
+        """Path of a listed file, whose name may be arbitrary."""
         return self.root / one.space / one.name
 
     def _stored(self) -> Iterator[BlobFile]:
@@ -102,9 +102,9 @@ class FolderBlobs(BlobStore):
     def _age_of(self, one: BlobFile) -> float | None:
         return age_of(self.find_path(one))
 
-    def discard(self, found: Iterable[BlobFile]) -> None:
-        """See BlobStore; their names may be any."""
-        for one in found:
+    def discard(self, blob_files: Iterable[BlobFile]) -> None:
+        """See BlobStore; names may be arbitrary."""
+        for one in blob_files:
             fs.remove_file(self.find_path(one))
 
     def remove(self, space: str, *names: str) -> None:

@@ -1,7 +1,8 @@
-"""From the folder into a bucket, while servers and workers are stopped; killed at any time, it is run again.
+"""Moves stored files from the folder to a bucket, while servers and workers are stopped; resumable.
 
-Every file is put, read back from the bucket by its hash, and only then removed here, the trash too. That the
-move has begun is noted first: until it has ended no server starts and no command takes a file for missing.
+Every file, including the trash, is uploaded, read back, verified by hash, and only then removed locally. The
+start of the move is recorded first: until it is complete, no server starts and no command mistakes files for
+missing.
 """
 
 from __future__ import annotations
@@ -18,12 +19,12 @@ from sagittal.server.storage.files.blobs import INCOMING, IntegrityError, StoreA
 
 @dataclass(frozen=True)
 class MovedBlobs:
-    """What was moved.
+    """Summary of a move.
 
     Parameters
     ----------
-    files, trashed : how many stored files, and how many of the trash. size : bytes of the stored ones.
-    damaged : what stays in the folder, since its bytes are not its own.
+    files, trashed : numbers of stored and trashed files. size : bytes of the stored ones.
+    damaged : files with a wrong hash, which remain in the folder.
     """
 
     files: int
@@ -33,16 +34,16 @@ class MovedBlobs:
 
 
 def move_blobs(settings: Settings) -> MovedBlobs:
-    """Move every stored file of the data folder into the bucket of the settings, whose prefix must be empty.
+    """Move all stored files of the data folder to the configured bucket, whose prefix must be empty.
 
-    Called again after it has ended, it moves what has come into the folder since.
+    Called again after completion, it moves files added to the folder since.
 
     Raises
     ------
     SettingsError
-        no bucket is set, the files are in another one already, or the bucket refuses or holds something.
+        no bucket is set, the files are in another one, or the bucket denies access or is not empty.
     StoreAway
-        it cannot be reached; what was moved is there, and the next call goes on.
+        it cannot be reached; the next call resumes.
     """
     if not settings.bucket:
         raise SettingsError("Set SAGITTAL_BUCKET to where the stored files are to be, s3://name/prefix.")

@@ -1,8 +1,8 @@
-"""Opening the blobs where the settings say they are: the one place that knows both kinds.
+"""Opens the configured blob store, either kind.
 
-The data folder notes which bucket has its files, so that a command without the setting, or with another one,
-is refused instead of finding every file missing. It is noted once that bucket has let a server in or has
-taken a file, so that a mistyped name binds nobody.
+The data folder records the bucket of its files, so that a command with a missing or wrong setting is refused
+instead of finding all files missing. It is recorded once that bucket has granted access to a server or stored
+a file, so that a mistyped name has no effect.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ _MOVING: Final = "moving to "
 
 
 def open_blobs(settings: Settings) -> BlobStore:
-    """The stored files of this installation.
+    """Stored files of this installation.
 
     Raises
     ------
     SettingsError
-        they are elsewhere: in the folder or in another bucket than the settings name.
+        the files are in the folder or in a bucket other than configured.
     """
     noted = read_note(settings)
     if noted.startswith(_MOVING):
@@ -50,16 +50,16 @@ def open_blobs(settings: Settings) -> BlobStore:
 
 
 def require_use(blobs: BlobStore) -> bool:
-    """Look before a start whether the store lets us in; one that is away may come back, and is warned of.
+    """Check access to the store before startup; if it is unavailable, log a warning.
 
     Returns
     -------
-    Whether it did; False = it is away.
+    Whether access was granted; False = unavailable.
 
     Raises
     ------
     SettingsError
-        it refuses: no such bucket, wrong keys or region.
+        access denied: no such bucket, wrong keys or region.
     """
     if not isinstance(blobs, BucketBlobs):
         return True
@@ -79,7 +79,7 @@ def require_use(blobs: BlobStore) -> bool:
 
 
 def explain_refusal(blobs: BlobStore, error: StoreAway) -> str:
-    """A sentence for the administrator."""
+    """Message for the administrator."""
     return (
         f"{blobs.place} cannot be used ({error.detail}). Check SAGITTAL_BUCKET, AWS_ENDPOINT_URL, AWS_REGION "
         "and the keys."
@@ -87,13 +87,13 @@ def explain_refusal(blobs: BlobStore, error: StoreAway) -> str:
 
 
 def has_stored_files(settings: Settings) -> bool:
-    """Whether there are stored files in the data folder itself."""
+    """Whether the data folder itself contains stored files."""
     folder = settings.blobs
     return folder.is_dir() and any(is_space(path.name) and any(path.iterdir()) for path in folder.iterdir())
 
 
 def read_note(settings: Settings) -> str:
-    """The bucket that has the files of this data folder, "" = none."""
+    """The bucket recorded for this data folder, "" = none."""
     try:
         return (settings.blobs / _NOTE).read_text("utf-8").strip()
     except FileNotFoundError:
@@ -101,12 +101,12 @@ def read_note(settings: Settings) -> str:
 
 
 def note_bucket(settings: Settings) -> None:
-    """Note the bucket of the settings, if there is one and none is noted yet.
+    """Record the configured bucket, if there is one and none is recorded.
 
     Raises
     ------
     SettingsError
-        another one is.
+        another one is recorded.
     """
     noted = read_note(settings)
     if settings.bucket and not noted:
@@ -116,7 +116,7 @@ def note_bucket(settings: Settings) -> None:
 
 
 def warn_of_leftovers(settings: Settings) -> None:
-    """Say in the log that files lie in the data folder, where nobody finds them any more."""
+    """Log a warning if files remain in the data folder, where they are not found any more."""
     if settings.bucket and has_stored_files(settings):
         log.warning(
             "stored files are in %s too; stop servers and workers and run `sagittal move-blobs` again",
@@ -132,12 +132,12 @@ def _explain_other(settings: Settings, noted: str) -> str:
 
 
 def is_moving(settings: Settings) -> bool:
-    """Whether a move to the bucket of the settings has begun and not ended."""
+    """Whether a move to the configured bucket has started and is incomplete."""
     return read_note(settings) == _MOVING + settings.bucket
 
 
 def write_note(settings: Settings, *, moving: bool = False) -> None:
-    """Note, durably, which bucket has the files."""
+    """Durably record the bucket of the files."""
     fs.make_folder(settings.blobs)
     text = f"{_MOVING if moving else ''}{settings.bucket}\n"
     fs.write_file(settings.blobs / _NOTE, text.encode())

@@ -1,4 +1,4 @@
-"""A stored file as the readers of core take their input."""
+"""Stored files as input of the readers of core."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from sagittal.server.storage.files.blobs import BlobStore
 
 
 def open_source(store: BlobStore, space: str, name: str, size: int, sha256: str) -> SourceFile:
-    """A blob under its own name, read and verified when somebody needs it."""
+    """A blob as a source file, read and verified on demand."""
     return SourceFile(name, size, lambda: store.read(space, sha256), lambda: store.open(space, sha256))

@@ -1,13 +1,13 @@
 """Content-addressed files: `blobs/<space>/<sha256>`, immutable, verified at every read.
 
     blobs = open_blobs(settings)        # storage/blob_opening.py: a folder, or an S3-compatible bucket
-    blob = blobs.put(space, content)    # when this returns the file is durable there
+    blob = blobs.put(space, content)    # durable on return
 
-A space is a patient's id. The same bytes of two patients are two files, so that an upload cannot reveal what
-another patient has (no existence oracle) and an erased patient is an erased space.
+A space is a patient's id. Identical content of two patients is stored twice, so that an upload cannot reveal
+the files of another patient (no existence oracle) and erasing a patient erases a space.
 
-A file is always written anew over an equal one: that costs a write, repairs a damaged file, and makes the
-file young, so that the sweep of unreferenced files cannot take what somebody is about to refer to.
+An existing file is always overwritten by an equal one: this costs a write, but repairs a damaged file and
+renews its time, so that the sweep of unreferenced files cannot remove a file about to be referenced.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ INCOMING = "incoming"
 
 
 class IntegrityError(SagittalError):
-    """A stored file is gone or its bytes are not those that were stored."""
+    """A stored file is missing or its content has changed."""
 
     status = 503
 
 
 class StoreAway(SagittalError):  # noqa: N818 - says what is the matter
-    """The store cannot be asked now: nothing is known of the file, and trying again may help.
+    """The store is unavailable: the state of the file is unknown, and retrying may help.
 
     Parameters
     ----------
-    refuses : it answers but does not let us in, which somebody must mend. detail : for the administrator.
+    refuses : access is denied, which requires an administrator. detail : for the administrator.
     """
 
     status = 503
@@ -64,7 +64,7 @@ REFUSES: Final = "The bucket of stored files refuses the server; nothing was cha
 
 @dataclass(frozen=True)
 class Blob:
-    """A stored file: its content's hash and its length in bytes."""
+    """A stored file: hash and size in bytes of its content."""
 
     sha256: str
     size: int
@@ -72,7 +72,7 @@ class Blob:
 
 @dataclass(frozen=True)
 class BlobFile:
-    """A file found in the store, referred to or not; `age_s` since it was written."""
+    """A file listed in the store, referenced or not; `age_s` since it was written."""
 
     space: str
     name: str
@@ -80,12 +80,12 @@ class BlobFile:
 
 
 class BlobStore(ABC):
-    """All blobs, wherever they are.
+    """Store of all blobs.
 
     Parameters
     ----------
-    incoming : local folder of files on their way in; made if absent. trash : what nothing refers to any more.
-    place : where they are, for people.
+    incoming : local folder of files being received; created if absent. trash : unreferenced files.
+    place : description of the location for users.
     """
 
     moved_at_once: ClassVar[int]
@@ -98,51 +98,53 @@ class BlobStore(ABC):
 
     @abstractmethod
     def receive(self, space: str, limit: int | None = None) -> Receiver:
-        """Take a file in chunks: `with store.receive(pid, limit) as r: r.write(chunk); blob = r.keep()`."""
+        """Receive a file in chunks: `with store.receive(pid, limit) as r: r.write(chunk); blob =
+        r.keep()`.
+        """
 
     @abstractmethod
     def adopt(self, space: str, path: Path, sha256: str) -> None:
-        """Take over a synced file of `incoming` with this content, durably.
+        """Durably store a synced file of `incoming` with this content.
 
-        A folder moves it; a bucket leaves it to the caller, who removes it once its row is written.
+        A folder moves it; with a bucket the caller removes it once its row is written.
         """
 
     def put(self, space: str, content: bytes) -> Blob:
-        """Store bytes; when this returns they survive a power cut."""
+        """Store bytes durably."""
         with self.receive(space) as receiver:
             receiver.write(content)
             return receiver.keep()
 
     def part(self, upload_id: str) -> Path:
-        """Where a file that comes in parts waits to be whole (services/uploads.py)."""
+        """Path of an incomplete file that is uploaded in parts (services/uploads.py)."""
         return self.incoming / self.name_part(upload_id)
 
     @staticmethod
     def name_part(upload_id: str) -> str:
-        """Name of that file."""
+        """Name of an incomplete file."""
         if not _HEX32.fullmatch(upload_id):
             raise ValueError(f"'{upload_id}' is not the id of an upload.")
         return f"{upload_id}.part"
 
     def hold_part(self, upload_id: str) -> AbstractContextManager[None]:
-        """Be the only one who adds to this part or names it, of all processes that share the folder.
+        """Lock a part for appending or renaming, across all processes that share the folder.
 
-        A few others wait with it, so that the files of the locks stay few.
+        Locks are shared by several parts to limit the number of lock files.
         """
         fs.make_folder(self._locks)
         return fs.hold_lock(self._locks / f"{self.name_part(upload_id)[:2]}.lock")
 
     def lock_sweep(self) -> fs.Lock:
-        """Be the only sweep of all processes that share the folder; raises fs.LockedError."""
+        """Lock for a sweep, across all processes that share the folder; raises fs.LockedError."""
         fs.make_folder(self._locks)
         return fs.Lock(self._locks / "sweep.lock", "a sweep")
 
     @abstractmethod
     def probe(self) -> None:
-        """Write something and remove it again; raises OSError, StoreAway."""
+        """Write and remove a test file; raises OSError, StoreAway."""
 
     def read(self, space: str, sha256: str) -> bytes:
-        """Return the bytes, or raise IntegrityError (blob_missing, blob_damaged), StoreAway."""
+        """Return the verified bytes; raise IntegrityError (blob_missing, blob_damaged), StoreAway."""
         content = self._load(space, sha256)
         if content is None:
             raise make_missing(sha256)
@@ -151,7 +153,7 @@ class BlobStore(ABC):
         return content
 
     def open(self, space: str, sha256: str) -> BinaryIO:
-        """Open the bytes, verified before the first is given; raises as `read`."""
+        """Open the content, fully verified beforehand; raises like `read`."""
         file = self.open_unverified(space, sha256)
         if file is None:
             raise make_missing(sha256)
@@ -163,35 +165,35 @@ class BlobStore(ABC):
 
     @abstractmethod
     def _load(self, space: str, sha256: str) -> bytes | None:
-        """The bytes as they are; None = the file is not there."""
+        """Unverified bytes; None = the file is missing."""
 
     @abstractmethod
     def open_unverified(self, space: str, sha256: str) -> BinaryIO | None:
-        """Open the bytes as they are, to be sought in and closed; None = the file is not there."""
+        """Open the content for seeking, unverified; None = the file is missing."""
 
     @abstractmethod
     def read_part(self, space: str, sha256: str, start: int, stop: int) -> bytes:
-        """Bytes from `start` to before `stop`, as they are.
+        """Bytes from `start` up to `stop`, unverified.
 
         Raises
         ------
         IntegrityError
-            blob_missing; blob_damaged where the file is shorter.
+            blob_missing; blob_damaged if the file is shorter.
         StoreAway
             the store cannot be reached.
         """
 
     @abstractmethod
     def has(self, space: str, sha256: str) -> bool:
-        """Whether the file is there; asked briefly, since a write lock may be held meanwhile."""
+        """Whether the file exists; uses a short timeout, since a write lock may be held."""
 
     def require(self, space: str, sha256: str) -> None:
-        """Raise IntegrityError unless the file is there; call it in the transaction that refers to it."""
+        """Raise IntegrityError if the file is missing; call in the transaction that refers to it."""
         if not self.has(space, sha256):
             raise make_missing(sha256)
 
     def files(self) -> Iterator[BlobFile]:
-        """Every file of ours in the store, half-received ones too (their space is INCOMING)."""
+        """All files in the store, including partially received ones (their space is INCOMING)."""
         for path in sorted(self.incoming.iterdir()):
             age_s = age_of(path)
             if age_s is not None:
@@ -200,21 +202,21 @@ class BlobStore(ABC):
 
     @abstractmethod
     def _stored(self) -> Iterator[BlobFile]:
-        """Every file that was stored whole."""
+        """All completely stored files."""
 
     def is_older(self, one: BlobFile, age_s: float) -> bool:
-        """Look again: it is there, and nobody has written it anew since it was found."""
-        found = age_of(self.incoming / one.name) if one.space == INCOMING else self._age_of(one)
-        return found is not None and found >= age_s
+        """Whether a listed file still exists and has not been rewritten since."""
+        age = age_of(self.incoming / one.name) if one.space == INCOMING else self._age_of(one)
+        return age is not None and age >= age_s
 
     @abstractmethod
     def _age_of(self, one: BlobFile) -> float | None:
-        """Seconds since a stored file was written; None = it is not there."""
+        """Seconds since a stored file was written; None = it is missing."""
 
-    def discard(self, found: Iterable[BlobFile]) -> None:
-        """Remove files that were found, for good."""
+    def discard(self, blob_files: Iterable[BlobFile]) -> None:
+        """Permanently remove listed files."""
         of_spaces: dict[str, list[str]] = {}
-        for one in found:
+        for one in blob_files:
             if one.space == INCOMING:
                 fs.remove_file(self.incoming / one.name)
             else:
@@ -224,30 +226,30 @@ class BlobStore(ABC):
 
     @abstractmethod
     def remove(self, space: str, *names: str) -> None:
-        """Remove files for good; gone already is fine. Asked briefly, as `has`."""
+        """Permanently remove files; no error if absent. Uses a short timeout like `has`."""
 
     @abstractmethod
     def erase(self, space: str) -> None:
-        """Remove a whole space."""
+        """Remove an entire space."""
 
     @abstractmethod
     def settle(self, spaces: Iterable[str]) -> None:
-        """Make what was removed from these spaces survive a power cut."""
+        """Make removals from these spaces durable."""
 
 
 class Receiver(ABC):
-    """One blob on its way in, in a local file until it is whole."""
+    """A blob being received into a local file."""
 
     def __init__(self, incoming: Path, limit: int | None) -> None:
         self._file = fs.IncomingFile(incoming, limit)
 
     def write(self, data: bytes) -> None:
-        """Append bytes; raises fs.SizeLimitError beyond the limit."""
+        """Append bytes; raises fs.SizeLimitError if the limit is exceeded."""
         self._file.write(data)
 
     @abstractmethod
     def keep(self) -> Blob:
-        """Give the file its name; when this returns it is durable. Raises StoreAway."""
+        """Move the file to its final name, durably. Raises StoreAway."""
 
     def __enter__(self) -> Self:
         return self
@@ -257,7 +259,7 @@ class Receiver(ABC):
 
 
 def digest_open(file: BinaryIO) -> str:
-    """Hexadecimal SHA-256 of an open file from its place on, read piece by piece."""
+    """Hexadecimal SHA-256 of an open file from its current position, read in parts."""
     digest = hashlib.sha256()
     while piece := file.read(PIECE):
         digest.update(piece)
@@ -265,19 +267,19 @@ def digest_open(file: BinaryIO) -> str:
 
 
 def check_address(space: str, sha256: str) -> str:
-    """`<space>/<sha256>` of a blob; raises ValueError when it is none."""
+    """`<space>/<sha256>` of a blob; raises ValueError if invalid."""
     if not (is_space(space) and _HEX64.fullmatch(sha256)):
         raise ValueError(f"'{space}/{sha256}' is not the address of a blob.")
     return f"{space}/{sha256}"
 
 
 def is_space(name: str) -> bool:
-    """Whether a space may have this name."""
+    """Whether the name is valid for a space."""
     return _HEX32.fullmatch(name) is not None
 
 
 def age_of(path: Path) -> float | None:
-    """Seconds since a local file was written; None = it is not there."""
+    """Seconds since a local file was written; None = it is missing."""
     try:
         return time.time() - path.stat().st_mtime
     except FileNotFoundError:
@@ -285,7 +287,7 @@ def age_of(path: Path) -> float | None:
 
 
 def make_damaged(sha256: str) -> IntegrityError:
-    """What is said of a file whose bytes are not its own."""
+    """Error for a file whose content has changed."""
     return IntegrityError(
         "blob_damaged",
         f"The stored file {sha256[:12]}… has changed on the disk; its content is not used. "
@@ -294,7 +296,7 @@ def make_damaged(sha256: str) -> IntegrityError:
 
 
 def make_missing(sha256: str) -> IntegrityError:
-    """What is said of a file that is gone."""
+    """Error for a missing file."""
     return IntegrityError(
         "blob_missing",
         f"The stored file {sha256[:12]}… is not there. "

@@ -1,4 +1,4 @@
-"""One bucket of any store that speaks S3: the calls of the library, our errors, our patience."""
+"""S3-compatible bucket: library calls with our error types and timeouts."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class S3Bucket:
 
     Parameters
     ----------
-    silence_s : longest wait for a word of the store. retries : how often a request is tried again.
+    silence_s : timeout for a response of the store. retries : number of retries of a request.
 
     Raises
     ------
@@ -66,25 +66,25 @@ class S3Bucket:
         self._store = _open_store(name, prefix, silence_s, retries)
 
     def put(self, key: str, content: bytes | Path) -> str | None:
-        """Store an object; returns the version that the bucket keeps, None = it keeps none."""
+        """Store an object; return its version in the bucket, None = unversioned."""
         with self._reached():
             done = self._lib.put(self._store, key, content, chunk_size=PUT_BYTES, max_concurrency=PUT_AT_ONCE)
         return done["version"]
 
     def load(self, key: str) -> bytes | None:
-        """All of an object; None = it is not there."""
+        """Content of an object; None = it does not exist."""
         with contextlib.suppress(_AbsentError), self._reached():
             return bytes(self._lib.get(self._store, key).bytes())
         return None
 
     def load_part(self, key: str, start: int, stop: int) -> bytes | None:
-        """Some of an object; None = it is not there."""
+        """Part of an object; None = it does not exist."""
         with contextlib.suppress(_AbsentError), self._reached():
             return bytes(self._lib.get_range(self._store, key, start=start, end=stop))
         return None
 
     def fetch(self, key: str, folder: Path) -> BinaryIO | None:
-        """An object as a local file without a name, at its beginning; None = it is not there."""
+        """An object as an anonymous local file, positioned at its start; None = it does not exist."""
         file = fs.open_scratch(folder)
         try:
             with self._reached():
@@ -105,13 +105,13 @@ class S3Bucket:
         return file
 
     def find(self, key: str) -> Any:
-        """Size and time of an object; None = it is not there."""
+        """Size and time of an object; None = it does not exist."""
         with contextlib.suppress(_AbsentError), self._reached():
             return self._lib.head(self._store, key)
         return None
 
     def list(self, prefix: str) -> Iterator[Any]:
-        """Every object under a prefix, by name."""
+        """All objects under a prefix, by name."""
         pages = iter(self._lib.list(self._store, prefix.rstrip("/") or None))
         while True:
             with self._reached():
@@ -121,12 +121,12 @@ class S3Bucket:
             yield from page
 
     def copy(self, source: str, target: str) -> None:
-        """Copy an object within the bucket; one that has gone is passed over."""
+        """Copy an object within the bucket; a missing one is skipped."""
         with contextlib.suppress(_AbsentError), self._reached():
             self._lib.copy(self._store, source, target)
 
     def delete(self, keys: Collection[str]) -> None:
-        """Remove objects for good; gone already is fine."""
+        """Permanently remove objects; no error if absent."""
         every = list(keys)
         for i in range(0, len(every), DELETE_AT_ONCE):
             with contextlib.suppress(_AbsentError), self._reached():
@@ -134,7 +134,7 @@ class S3Bucket:
 
     @contextlib.contextmanager
     def _reached(self) -> Iterator[None]:
-        """Turn what the library raises into StoreAway, or _AbsentError of an object that is not there."""
+        """Convert library errors to StoreAway, or to _AbsentError for a missing object."""
         detail, until = self._away
         began = time.monotonic()
         if began < until:
@@ -159,14 +159,14 @@ class S3Bucket:
 
 
 class _AbsentError(Exception):
-    """There is no such object."""
+    """The object does not exist."""
 
 
 def _shorten(text: str) -> str:
-    """The words of the store's answer, or what kept it from answering."""
-    said = re.search(r"<Code>(.*?)</Code>\s*(?:<Message>(.*?)</Message>)?", text)
-    if said is not None:
-        return ": ".join(part for part in said.groups() if part)[:300]
+    """Message of the store's response, or of the failure to reach it."""
+    match = re.search(r"<Code>(.*?)</Code>\s*(?:<Message>(.*?)</Message>)?", text)
+    if match is not None:
+        return ": ".join(part for part in match.groups() if part)[:300]
     return text.split("\n", 1)[0].strip()[:300]
 
 
@@ -196,12 +196,12 @@ def _open_store(name: str, prefix: str, silence_s: float, retries: int) -> S3Sto
 
 
 def _may_be_plain() -> bool:
-    """Whether the endpoint may be asked without TLS: on this computer, or where AWS_ALLOW_HTTP says so.
+    """Whether the endpoint may be used without TLS: on this computer, or if AWS_ALLOW_HTTP permits it.
 
     Raises
     ------
     SettingsError
-        it would cross the network unencrypted.
+        data would cross the network unencrypted.
     """
     names = ("AWS_ENDPOINT_URL_S3", "AWS_ENDPOINT_URL", "AWS_ENDPOINT")
     endpoint = next((os.environ[name] for name in names if os.environ.get(name)), "")

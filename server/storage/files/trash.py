@@ -1,8 +1,8 @@
-"""Stored files that nothing refers to any more: `trash/<when>/<space>/<sha256>`, kept for 30 days.
+"""Unreferenced stored files: `trash/<when>/<space>/<sha256>`, retained for 30 days.
 
-A folder `<when>` (UTC, 20260314T031500Z) has the shape of `blobs/`, so files can be put back by hand. What
-lies there is known from the names alone. In a folder a file is moved by one rename, a crash leaves it here or
-there, and `trash/list.txt` says the same for people. In a bucket it is copied, then removed.
+A folder `<when>` (UTC, 20260314T031500Z) has the layout of `blobs/`, so files can be restored manually. The
+content is determined by names alone. In a folder each file is moved by one rename, so a crash leaves it in
+either place, and `trash/list.txt` lists the files for users. In a bucket a file is copied, then removed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Address = tuple[str, str]
 
 @dataclass(frozen=True)
 class TrashedFile:
-    """One file in the trash: which blob it was, its length in bytes, and since when it lies there."""
+    """One file in the trash: its blob, size in bytes, and time of removal."""
 
     space: str
     name: str
@@ -39,58 +39,58 @@ class TrashedFile:
 
     @property
     def until(self) -> dt.datetime:
-        """When it is removed for good."""
+        """Time of permanent deletion."""
         return self.since + KEPT
 
     @property
     def way(self) -> str:
-        """Where it lies within the trash: `<when>/<space>/<sha256>`."""
+        """Path within the trash: `<when>/<space>/<sha256>`."""
         return f"{name_stamp(self.since)}/{self.space}/{self.name}"
 
 
 class Trash(ABC):
-    """All of it; `place` says to people where it is."""
+    """Trash of a blob store; `place` describes its location to users."""
 
     place: str
 
     @abstractmethod
     def files(self) -> Iterator[TrashedFile]:
-        """Every file, the oldest first; what is not ours is passed over, and what goes meanwhile."""
+        """All files, oldest first; foreign files and those that disappear meanwhile are skipped."""
 
     @abstractmethod
-    def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Do what takes time before `take`, which is called under a lock."""
+    def prepare(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """Do the time-consuming part of `take`, which is called under a lock."""
 
     @abstractmethod
-    def take(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Move stored files here, all of them prepared; survives a power cut only after `settle`."""
+    def take(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """Move prepared files here; durable only after `settle`."""
 
     @abstractmethod
-    def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Undo `prepare` of what was not taken."""
+    def forget(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """Undo `prepare` for files not taken."""
 
     @abstractmethod
-    def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """Make what `take` did survive a power cut."""
+    def settle(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """Make the effects of `take` durable."""
 
     @abstractmethod
     def put_back(self, one: TrashedFile) -> None:
-        """Give a file its place among the blobs again, durably."""
+        """Durably restore a file to the blobs."""
 
     @abstractmethod
     def open(self, one: TrashedFile) -> BinaryIO:
-        """Its bytes as they are; raises OSError, StoreAway."""
+        """Open unverified content; raises OSError, StoreAway."""
 
     @abstractmethod
     def remove(self, space: str, names: Iterable[str] | None = None) -> None:
-        """Remove these files of a space for good, durably; None = the whole space."""
+        """Permanently and durably remove these files of a space; None = the whole space."""
 
     @abstractmethod
-    def drop(self, found: Collection[TrashedFile]) -> None:
-        """Remove files for good."""
+    def drop(self, trashed: Collection[TrashedFile]) -> None:
+        """Permanently remove files."""
 
     def expire(self, now: dt.datetime) -> int:
-        """Remove for good what has lain here long enough; return how many files."""
+        """Permanently remove expired files; return their number."""
         old = [one for one in self.files() if one.until <= now]
         if old:
             self.drop(old)
@@ -98,18 +98,18 @@ class Trash(ABC):
 
     @abstractmethod
     def tidy(self) -> None:
-        """Put things in order after files have gone."""
+        """Clean up after files have been removed."""
 
 
-def name_stamp(at: dt.datetime) -> str:
-    """`<when>`."""
-    return at.astimezone(dt.UTC).strftime(_STAMP)
+def name_stamp(time: dt.datetime) -> str:
+    """Format `<when>`."""
+    return time.astimezone(dt.UTC).strftime(_STAMP)
 
 
 def parse_way(way: str, size: int) -> TrashedFile | None:
-    """The file at `<when>/<space>/<sha256>`; None when it is none of ours."""
-    stamp, _, rest = way.partition("/")
-    space, _, name = rest.partition("/")
+    """The file at `<when>/<space>/<sha256>`; None if the path is foreign."""
+    stamp, _, tail = way.partition("/")
+    space, _, name = tail.partition("/")
     since = _parse_stamp(stamp)
     if since is None or not (_SPACE.fullmatch(space) and _NAME.fullmatch(name)):
         return None
@@ -118,18 +118,18 @@ def parse_way(way: str, size: int) -> TrashedFile | None:
 
 def _parse_stamp(name: str) -> dt.datetime | None:
     try:
-        at = dt.datetime.strptime(name, _STAMP).replace(tzinfo=dt.UTC)
+        time = dt.datetime.strptime(name, _STAMP).replace(tzinfo=dt.UTC)
     except ValueError:
         return None
-    return at if name_stamp(at) == name else None
+    return time if name_stamp(time) == name else None
 
 
 class FolderTrash(Trash):
-    """The folder; made when the first file comes.
+    """Trash in a folder, created with the first file.
 
     Parameters
     ----------
-    blobs : the folder that files come from, on the same file system.
+    blobs : folder of the stored files, on the same file system.
     """
 
     def __init__(self, root: Path, blobs: Path) -> None:
@@ -137,7 +137,7 @@ class FolderTrash(Trash):
         self._blobs = blobs
 
     def path(self, one: TrashedFile) -> Path:
-        """Where a file lies."""
+        """Path of a file."""
         return self.root / one.way
 
     def files(self) -> Iterator[TrashedFile]:
@@ -150,23 +150,23 @@ class FolderTrash(Trash):
                     if _NAME.fullmatch(path.name) and (size := _size(path)) is not None:
                         yield TrashedFile(folder.name, path.name, size, since)
 
-    def prepare(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; a rename needs nothing."""
+    def prepare(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; a rename requires no preparation."""
 
-    def take(self, found: Collection[Address], at: dt.datetime) -> None:
+    def take(self, addresses: Collection[Address], time: dt.datetime) -> None:
         """See Trash."""
-        for space, name in found:
-            fs.move_file(self._blobs / space / name, self._folder(at) / space / name)
+        for space, name in addresses:
+            fs.move_file(self._blobs / space / name, self._folder(time) / space / name)
 
-    def forget(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; nothing was done."""
+    def forget(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; there is nothing to undo."""
 
-    def settle(self, found: Collection[Address], at: dt.datetime) -> None:
-        """See Trash; writes the list too."""
-        if not found:
+    def settle(self, addresses: Collection[Address], time: dt.datetime) -> None:
+        """See Trash; also writes the list."""
+        if not addresses:
             return
-        for space in sorted({space for space, _ in found}):
-            fs.sync_folder(self._folder(at) / space)
+        for space in sorted({space for space, _ in addresses}):
+            fs.sync_folder(self._folder(time) / space)
             fs.sync_folder(self._blobs / space)
         self.write_list()
 
@@ -183,26 +183,26 @@ class FolderTrash(Trash):
 
     def remove(self, space: str, names: Iterable[str] | None = None) -> None:
         """See Trash."""
-        wanted = None if names is None else set(names)
+        selected = None if names is None else set(names)
         for stamp, _ in self._stamps():
             folder = stamp / space
             if folder.is_symlink() or not folder.is_dir():
                 continue
-            if wanted is None:
+            if selected is None:
                 fs.remove_folder(folder)
             else:
-                for name in wanted:
+                for name in selected:
                     fs.remove_file(folder / name)
                 fs.sync_folder(folder)
 
-    def drop(self, found: Collection[TrashedFile]) -> None:
+    def drop(self, trashed: Collection[TrashedFile]) -> None:
         """See Trash."""
-        for one in found:
+        for one in trashed:
             fs.remove_file(self.path(one))
         self.tidy()
 
     def tidy(self) -> None:
-        """Remove empty folders and write the list, after files have gone."""
+        """Remove empty folders and write the list."""
         for stamp, _ in self._stamps():
             for folder in (*_entries(stamp), stamp):
                 if folder.is_dir() and not folder.is_symlink() and not _entries(folder):
@@ -210,7 +210,7 @@ class FolderTrash(Trash):
         self.write_list()
 
     def write_list(self) -> None:
-        """Write `list.txt`: since, until, bytes and place of every file."""
+        """Write `list.txt`: removal, expiry, size and path of every file."""
         if not self.root.is_dir():
             return
         lines = [
@@ -220,21 +220,21 @@ class FolderTrash(Trash):
         head = "# Stored files that the database does not know: since, removed on, bytes, place.\n"
         fs.write_file(self.root / "list.txt", (head + "".join(lines)).encode())
 
-    def _folder(self, at: dt.datetime) -> Path:
-        return self.root / name_stamp(at)
+    def _folder(self, time: dt.datetime) -> Path:
+        return self.root / name_stamp(time)
 
     def _stamps(self) -> list[tuple[Path, dt.datetime]]:
-        """Folders and their times, the oldest first."""
-        found = []
+        """Folders and their times, oldest first."""
+        stamps = []
         for path in sorted(self.root.iterdir()) if self.root.is_dir() else ():
             since = _parse_stamp(path.name)
             if since is not None and path.is_dir() and not path.is_symlink():
-                found.append((path, since))
-        return found
+                stamps.append((path, since))
+        return stamps
 
 
 def _entries(folder: Path) -> list[Path]:
-    """What lies in a folder, by name; nothing when it is none or has gone."""
+    """Content of a folder, by name; empty if it is not a folder or has disappeared."""
     try:
         return [] if folder.is_symlink() else sorted(folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
@@ -242,9 +242,9 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _size(path: Path) -> int | None:
-    """Bytes of a file; None when it is none or has gone."""
+    """Size of a file in bytes; None if it is not a file or has disappeared."""
     try:
-        found = path.lstat()
+        status = path.lstat()
     except FileNotFoundError:
         return None
-    return found.st_size if stat.S_ISREG(found.st_mode) else None
+    return status.st_size if stat.S_ISREG(status.st_mode) else None

@@ -1,1 +1,1 @@
-"""Tables and the rules of their rows."""
+"""Tables and constraints."""

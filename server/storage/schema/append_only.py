@@ -1,4 +1,4 @@
-"""Rows that may not be changed, or not be deleted: the triggers that refuse it, on either engine."""
+"""Triggers that prevent changing or deleting rows, on either engine."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _REFUSE: Final = (
 
 
 def write_triggers(dialect: str, table: str, verbs: tuple[str, ...], sentence: str) -> tuple[str, ...]:
-    """The statements that make a table refuse UPDATE or DELETE with a sentence."""
+    """Statements that make a table reject UPDATE or DELETE with an error message."""
     if dialect == "sqlite":
         return tuple(
             f"CREATE TRIGGER {table}_no_{verb.lower()} BEFORE {verb} ON {table} "
@@ -21,19 +21,19 @@ def write_triggers(dialect: str, table: str, verbs: tuple[str, ...], sentence: s
             for verb in verbs
         )
     call = f"EXECUTE FUNCTION refuse_change('{sentence}')"
-    made = [
+    statements = [
         f"CREATE TRIGGER {table}_no_{verb.lower()} BEFORE {verb} ON {table} FOR EACH ROW {call}"
         for verb in verbs
     ]
     if "DELETE" in verbs:
-        made.append(
+        statements.append(
             f"CREATE TRIGGER {table}_no_truncate BEFORE TRUNCATE ON {table} FOR EACH STATEMENT {call}"
         )
-    return (_REFUSE, *made)
+    return (_REFUSE, *statements)
 
 
 def make_append_only(table: Table, verbs: tuple[str, ...], sentence: str) -> None:
-    """Give a table these triggers wherever it is created."""
+    """Add these triggers to a table wherever it is created."""
     for dialect in ("sqlite", "postgresql"):
         for statement in write_triggers(dialect, table.name, verbs, sentence):
             ddl = DDL(statement).execute_if(dialect=dialect)  # type: ignore[no-untyped-call]

@@ -1,4 +1,4 @@
-"""Tables of who may open whom, where the clinic has care teams; by the rules of storage/tables.py."""
+"""Tables of care teams and emergency access; for conventions see storage/tables.py."""
 
 from __future__ import annotations
 

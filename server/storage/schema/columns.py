@@ -1,4 +1,4 @@
-"""What tables are made of: ids, times, JSON, references, stored files, names, the rule of a few values."""
+"""Column types and constraints: ids, times, JSON, references, stored files, names, enumerations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from sqlalchemy import (
     TypeDecorator,
 )
 
-from sagittal.web.user_text import UserText, mark_user_text
+from sagittal.core.user_text import UserText, mark_user_text
 
 Made = TypeVar("Made")
 
@@ -41,29 +41,29 @@ Json = JSON(none_as_null=True)
 
 
 class UserString(TypeDecorator[str]):
-    """Text that a person entered or uploaded: rows give it as `UserText`, which no page translates."""
+    """Text entered or uploaded by users: loaded as `UserText`, which pages do not translate."""
 
     impl = String
     cache_ok = True
 
     def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """Hand the driver a plain string."""
+        """Pass a plain string to the driver."""
         return None if value is None else str(value)
 
     def process_result_value(self, value: str | None, dialect: Dialect) -> UserText | None:
-        """Give back user text."""
+        """Return user text."""
         return None if value is None else UserText(value)
 
 
 class UserLines(UserString):
-    """The same without a limit of its length."""
+    """User text without a length limit."""
 
     impl = Text
     cache_ok = True
 
 
 class UserJson(TypeDecorator[Any]):
-    """JSON whose texts were entered or uploaded, or are codes that no page shows: all of them `UserText`."""
+    """JSON whose texts are user input, or codes that pages never show: all are loaded as `UserText`."""
 
     impl = JSON
     cache_ok = True
@@ -72,28 +72,28 @@ class UserJson(TypeDecorator[Any]):
         super().__init__(none_as_null=True)
 
     def process_result_value(self, value: Any, dialect: Dialect) -> Any:
-        """Give back the value with every text marked."""
+        """Return the value with every text marked."""
         return mark_user_text(value)
 
 
 def new_id() -> str:
-    """A fresh random id: 32 hex digits of a uuid4."""
+    """A new random id: 32 hex digits of a uuid4."""
     return uuid.uuid4().hex
 
 
 def now() -> dt.datetime:
-    """The time as tables keep it: aware, UTC."""
+    """Current time as stored in tables: aware, UTC."""
     return dt.datetime.now(dt.UTC)
 
 
 class Utc(TypeDecorator[dt.datetime]):
-    """An aware time, stored as UTC; naive times are refused."""
+    """Aware time, stored as UTC; naive times are rejected."""
 
     impl = DateTime(timezone=True)
     cache_ok = True
 
     def process_bind_param(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
-        """Refuse a naive time, store UTC."""
+        """Reject a naive time, store UTC."""
         if value is None:
             return None
         if value.tzinfo is None:
@@ -102,36 +102,36 @@ class Utc(TypeDecorator[dt.datetime]):
         return utc.replace(tzinfo=None) if dialect.name == "sqlite" else utc
 
     def process_result_value(self, value: dt.datetime | None, dialect: Dialect) -> dt.datetime | None:
-        """Give back an aware UTC time."""
+        """Return an aware UTC time."""
         if value is None:
             return None
         return value.replace(tzinfo=dt.UTC) if value.tzinfo is None else value.astimezone(dt.UTC)
 
 
 def make_all(kind: Callable[..., Made], result: Result[Any]) -> list[Made]:
-    """Make of every row of a result what takes its columns by their names."""
+    """Convert all rows of a result by passing their columns as keyword arguments."""
     names = tuple(result.keys())
     return [kind(**dict(zip(names, row, strict=True))) for row in result]
 
 
 def id_column() -> Column[str]:
-    """The column of a table's own id."""
+    """Primary key column."""
     return Column("id", String(32), primary_key=True)
 
 
 def reference(name: str, target: str, *, nullable: bool = False, index: bool = True) -> Column[str]:
-    """A column of ids of another table, whose rows cannot go while this one refers to them."""
+    """Foreign key column; referenced rows cannot be deleted."""
     key = ForeignKey(f"{target}.id", ondelete="RESTRICT")
     return Column(name, String(32), key, nullable=nullable, index=index)
 
 
 def owner(name: str, target: str) -> Column[str]:
-    """The primary key, or a part of it, of rows that belong to a row of another table: that row's id."""
+    """Primary key (or part of it) that is the id of the owning row in another table."""
     return Column(name, String(32), ForeignKey(f"{target}.id", ondelete="RESTRICT"), primary_key=True)
 
 
 def describe_file() -> tuple[Column[int], Column[str], CheckConstraint]:
-    """The columns of a file of storage/blobs.py, size in bytes and SHA-256, and their rule."""
+    """Columns and constraint of a file of storage/blobs.py: size in bytes and SHA-256."""
     return (
         Column("size", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),
         Column("sha256", String(64), nullable=False, index=True),
@@ -140,6 +140,6 @@ def describe_file() -> tuple[Column[int], Column[str], CheckConstraint]:
 
 
 def one_of(column: str, values: Sequence[str]) -> CheckConstraint:
-    """The rule that a column holds one of these values."""
+    """Constraint that a column has one of these values."""
     quoted = ", ".join(f"'{v}'" for v in values)
     return CheckConstraint(f"{column} IN ({quoted})", name=column)

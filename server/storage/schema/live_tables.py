@@ -1,4 +1,4 @@
-"""Tables of live takes and of what happened in them; by the rules of storage/tables.py."""
+"""Tables of live trials and their events; for conventions see storage/tables.py."""
 
 from __future__ import annotations
 

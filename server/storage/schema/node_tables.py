@@ -1,4 +1,4 @@
-"""Tables of several web servers on one database; by the rules of tables.py. A restore empties them."""
+"""Tables of several web servers on one database, emptied by a restore; for conventions see tables.py."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""Tables of what opens an account besides its password, of who a patient is, and of what was agreed to.
+"""Tables of second factors and tokens, patient identities, and consents.
 
-By the rules of storage/tables.py.
+For conventions see storage/tables.py.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Tables of a session's report: the therapist's text, what was signed, the links to it.
+"""Tables of a session's report: assessment, signed versions, links.
 
-By the rules of storage/tables.py.
+For conventions see storage/tables.py.
 """
 
 from __future__ import annotations

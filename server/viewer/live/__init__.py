@@ -1,1 +1,1 @@
-"""The figure of a live take."""
+"""Avatar of a live trial."""

@@ -1,4 +1,4 @@
-"""A figure that is shown as its poses come: the same batches as the replay, one moment at a time."""
+"""Avatar updated from live poses: the same batches as the replay, one frame at a time."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ _BURIED: Final = np.array([0.0, 0.0, -100.0])
 
 
 class LiveFigure:
-    """One person in one viser server, standing and grey until poses come.
+    """One avatar in one viser server, standing and grey until poses arrive.
 
     Parameters
     ----------
-    server : a viser server of its own.
+    server : a dedicated viser server.
     """
 
     def __init__(self, server: viser.ViserServer, body: BodyModel, dark: bool = False) -> None:
@@ -52,11 +52,11 @@ class LiveFigure:
 
     @property
     def is_grey(self) -> bool:
-        """Whether the figure is grey because what it shows is no longer current."""
+        """Whether the avatar is grey because its data are outdated."""
         return self._grey
 
     def wait(self) -> None:
-        """Show the figure standing until poses come."""
+        """Show the avatar standing until poses arrive."""
         if self._key == ("standing",):
             return
         q, p = (x[np.newaxis] for x in stand_upright(self._body))
@@ -69,11 +69,11 @@ class LiveFigure:
         self._server.flush()
 
     def show(self, moment: FigureMoment, *, late: bool = False) -> None:
-        """Show a moment and send it at once; one that is not valid leaves the figure as it was, grey.
+        """Show a frame and send it immediately; an invalid one leaves the avatar unchanged and grey.
 
         Parameters
         ----------
-        late : it is over already; shown in grey.
+        late : the frame is outdated; shown in grey.
         """
         if self._t_s is not None and not 0.0 <= moment.t_s - self._t_s <= GAP_S:
             self._floor.clear()
@@ -88,13 +88,13 @@ class LiveFigure:
             self._set_grey(late)
 
     def set_stale(self) -> None:
-        """Turn the figure grey until the next moment, since nothing has come for a while."""
+        """Turn the avatar grey until the next frame, after a gap in the data."""
         if not self._grey:
             self._set_grey(True)
             self._server.flush()
 
     def set_reference(self, walk: ReferenceWalk | None) -> None:
-        """Show a walk pale in the same place at the same share of the cycle, None = none."""
+        """Overlay a walk as a ghost at the same phase of the gait cycle, None = none."""
         self._reference = walk
 
     def _show(self, moment: FigureMoment) -> None:
@@ -107,11 +107,11 @@ class LiveFigure:
         if rows is not None and self._reference is not None:
             # the ghost is one frame more of the same layout
             q, p = np.concatenate((q, q)), np.concatenate((p, p))
-            other = self._reference.at(moment.phase, (x, y), heading)
+            ghost_pose = self._reference.at(moment.phase, (x, y), heading)
             # a trunk that only the person has hangs on the ghost's pelvis as on the person's
-            p[1] = _BURIED if other is None else other[1][0]
-            if other is not None:
-                q[1, rows], p[1, rows] = other
+            p[1] = _BURIED if ghost_pose is None else ghost_pose[1][0]
+            if ghost_pose is not None:
+                q[1, rows], p[1, rows] = ghost_pose
         ghost = rows is not None
         key = (segments, moment.method, ghost)
         layout = self._layout
@@ -136,7 +136,7 @@ class LiveFigure:
         *,
         ghost: bool = False,
     ) -> None:
-        """Draw other parts than before."""
+        """Draw a different set of parts."""
         for part in (*self._drawn.parts.values(), *self._ghost.parts.values()):
             part.handle.remove()
         self._layout, self._key = layout, key
@@ -162,10 +162,10 @@ class LiveFigure:
 
 @lru_cache(maxsize=32)
 def _find_rows(segments: tuple[Segment, ...]) -> tuple[int, ...] | None:
-    """Where those of a ghost are among the segments with a pose; None where one has none."""
+    """Indices of a ghost's segments among those with a pose; None if one is missing."""
     return tuple(map(segments.index, SEGMENTS)) if set(SEGMENTS) <= set(segments) else None
 
 
 def _yaw(w: float, x: float, y: float, z: float) -> float:
-    """sagittal.core.rotation.yaw of one orientation, without arrays."""
+    """Scalar version of sagittal.core.rotation.yaw."""
     return atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))

@@ -1,6 +1,6 @@
-"""What a live walk leaves on the floor: the last prints and seconds of the trails.
+"""Floor marks of a live walk: recent footprints and trails.
 
-The rules are those of server/viewer/steps.py, applied as the frames come.
+Uses the rules of server/viewer/steps.py, applied frame by frame.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _PIXELS, _OPACITY = 1.6, 0.6
 
 
 class LiveFloor:
-    """Prints and trails in one scene.
+    """Footprints and trails in one scene.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class LiveFloor:
         self._sent_s = 0.0
 
     def clear(self) -> None:
-        """Forget prints and trails, for another walk begins."""
+        """Clear footprints and trails for a new walk."""
         for side in SIDES:
             self._trails[side] = _Trail()
             self._steps[side].clear()
@@ -64,26 +64,26 @@ class LiveFloor:
         self._sent_s = 0.0
 
     def push(self, t_s: float, side: Side, sole: Floats, q: Floats, contact: bool | None) -> None:
-        """Take in where the middle of a sole (3,) is and how the foot (4,) is turned."""
+        """Update with the position of the middle of the sole (3,) and the orientation of the foot (4,)."""
         x, y, z = sole.tolist()
         self._trails[side].push(t_s, (x, y, max(z, CLEAR_M)))
         if contact is not None:
             self._steps[side].push(t_s, (x, y, z), q, contact)
 
     def lose(self) -> None:
-        """Break the trail and end the contact of a foot whose samples are missing."""
+        """Interrupt the trail and end the contact of a foot with missing samples."""
         for side in SIDES:
             self._trails[side].lose()
             self._steps[side].lose()
 
     def send(self, t_s: float) -> None:
-        """Send the trails when the last time is `EVERY_S` ago."""
+        """Send the trails if the last transmission was `EVERY_S` ago."""
         if t_s - self._sent_s >= EVERY_S:
             self._sent_s = t_s
             draw_lines(self._line, self._points(t_s))
 
     def set_dark(self, dark: bool) -> None:
-        """Change the colours to the theme of the page around."""
+        """Change the colours to the theme of the embedding page."""
         for side in SIDES:
             self._steps[side].node.batched_colors = np.array(to_linear_rgb(TINTS[dark][side]), np.uint8)
         # as those of copies: viser takes one colour of all lines as sRGB, many as linear
@@ -95,7 +95,7 @@ class LiveFloor:
 
 
 class _Trail:
-    """Pieces of a way, of a fixed number; those that are not there have no length."""
+    """A fixed number of line segments; unused ones have zero length."""
 
     def __init__(self) -> None:
         self._t_s = np.full(PIECES, -np.inf)
@@ -103,14 +103,14 @@ class _Trail:
         self._next = 0
         self._last: Vector | None = None
 
-    def push(self, t_s: float, at: Vector) -> None:
+    def push(self, t_s: float, point: Vector) -> None:
         if self._last is None:
-            self._last = at
-        elif dist(at, self._last) >= PIECE_M:
+            self._last = point
+        elif dist(point, self._last) >= PIECE_M:
             self._t_s[self._next] = t_s
-            self._pieces[self._next] = self._last, at
+            self._pieces[self._next] = self._last, point
             self._next = (self._next + 1) % PIECES
-            self._last = at
+            self._last = point
 
     def lose(self) -> None:
         self._last = None
@@ -120,7 +120,7 @@ class _Trail:
 
 
 class _Steps:
-    """Where one foot rested: shown when it first does, put right when the contact ends."""
+    """Footprints of one foot: shown at the first rest, corrected at the end of the contact."""
 
     def __init__(self, scene: viser.SceneApi, side: Side, foot: float) -> None:
         self._position = np.zeros((PRINTS, 3), np.float32)
@@ -172,17 +172,17 @@ class _Steps:
                 self._print()
 
     def _print(self) -> None:
-        """Show the foot where it rests; restless feet move their last print."""
+        """Show a footprint at rest; while the foot keeps moving, its last print is updated."""
         last = (self._next - 1) % PRINTS
         place = self._rest[0]
-        again = self._scale[last] > 0 and np.hypot(*(self._position[last] - place)[:2]) <= SAME_M
-        self._shown = last if again else self._next
-        if not again:
+        is_same = self._scale[last] > 0 and np.hypot(*(self._position[last] - place)[:2]) <= SAME_M
+        self._shown = last if is_same else self._next
+        if not is_same:
             self._next = (self._next + 1) % PRINTS
         self._put(self._shown)
 
     def _lift(self) -> None:
-        """The contact is over: the print goes to the slowest moment of it."""
+        """At the end of a contact, move the print to the position of lowest speed."""
         if self._shown is not None:
             self._put(self._shown)
         elif np.isfinite(self._slowest):

@@ -1,4 +1,4 @@
-"""Where a person is and where they go, smoothed without delay and without their sway."""
+"""Position and heading of the walker, smoothed without delay and without lateral sway."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ Sample = tuple[float, float, float, float]
 
 
 class LivePath:
-    """Position and heading over the last two windows of about a stride.
+    """Position and heading over the last two windows of about one stride.
 
-    The mean over a window hides the sway but is half a window late; what it moved since the window before is
-    how much it lacks, so that a steady walk is followed exactly.
+    The mean over a window removes the sway but lags by half a window; the change from the previous window
+    compensates this lag, so that steady walking is followed exactly.
     """
 
     def __init__(self) -> None:
@@ -31,7 +31,7 @@ class LivePath:
         self._clear()
 
     def push(self, t_s: float, x: float, y: float, heading: float) -> tuple[float, float, float]:
-        """Take in a place in m and a heading in rad and return both smoothed."""
+        """Add a position in m and a heading in rad and return both smoothed."""
         if self._late.samples and not 0.0 <= t_s - self._late.samples[-1][0] <= GAP_S:
             self._clear()
         # unwrapped, so that a turn through ±π is a turn like any other
@@ -41,22 +41,22 @@ class LivePath:
             self._early.add(self._late.drop())
         while self._early.samples and self._early.samples[0][0] <= t_s - 2 * ROOT_WINDOW_S:
             self._early.drop()
-        now, *at = self._late.mean()
+        now, *position = self._late.mean()
         if self._early.samples and self._early.samples[0][0] <= t_s - 1.5 * ROOT_WINDOW_S:
             # both windows by what is in them: the older one may not be full yet
-            before, *was = self._early.mean()
-            share = (t_s - now) / (now - before)
-            at = [a + (a - b) * share for a, b in zip(at, was, strict=True)]
-        off_x, off_y = at[0] - x, at[1] - y
+            earlier, *was = self._early.mean()
+            share = (t_s - now) / (now - earlier)
+            position = [a + (a - b) * share for a, b in zip(position, was, strict=True)]
+        off_x, off_y = position[0] - x, position[1] - y
         share = min(1.0, NEAR_M / (hypot(off_x, off_y) or NEAR_M))
-        return x + share * off_x, y + share * off_y, at[2]
+        return x + share * off_x, y + share * off_y, position[2]
 
     def _clear(self) -> None:
         self._late, self._early = _Window(), _Window()
 
 
 class _Window:
-    """Samples and their sums, kept up to date from one to the next."""
+    """Samples with incrementally updated sums."""
 
     def __init__(self) -> None:
         self.samples: deque[Sample] = deque()

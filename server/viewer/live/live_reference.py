@@ -1,4 +1,4 @@
-"""Which walk stands beside a live figure: the norm, or the mean of the person's own better side."""
+"""Reference walk for a live avatar: the norm, or the mean of the patient's better side."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ NormAt = Callable[[float | None], Mapping[str, Floats]]
 
 
 class FeedStride(msgspec.Struct, frozen=True):
-    """What of a stride for the browsers (server/live/wire.py) is used here."""
+    """The fields of a stride message (server/live/wire.py) used here."""
 
     n: int
     side: Side
@@ -40,12 +40,12 @@ _told = msgspec.json.Decoder(FeedStride).decode
 
 
 class LiveReference:
-    """The reference of one person.
+    """The reference walk of one patient.
 
     Parameters
     ----------
-    norm : speed → variable → (n,) rad over the cycle, empty where no norm fits the person.
-    trained : the side that is prescribed for, if one is; then the other one is the better.
+    norm : speed → variable → (n,) rad over the cycle, empty if no norm applies.
+    trained : side of the prescription, if any; the other one is then the better side.
     """
 
     def __init__(self, body: BodyModel, norm: NormAt, trained: Callable[[], Side | None]) -> None:
@@ -57,17 +57,17 @@ class LiveReference:
     def find(
         self, choice: object, strides: tuple[bytes, ...], zero: Callable[[], Mapping[str, float]]
     ) -> ReferenceWalk | None:
-        """The walk of a choice "norm" or "better" ("own"); None for any other, or where there is none.
+        """The walk for the choice "norm" or "better" ("own"); None for others or if unavailable.
 
         Parameters
         ----------
-        strides : the last ones as told to the browsers, in order; one may be told twice.
-        zero : angle → rad at standing, asked for when strides are averaged.
+        strides : the latest stride messages to browsers, in order; may contain duplicates.
+        zero : returns angle → rad in standing, called when strides are averaged.
         """
         newest = strides[-1] if strides else b""
         if newest is not self._last:
             self._last = newest
-            self._strides = {told.n: told for told in map(_told, strides)}
+            self._strides = {feed_stride.n: feed_stride for feed_stride in map(_told, strides)}
             self._walks.clear()
         key = str(choice)
         if key not in self._walks:
@@ -88,26 +88,26 @@ class LiveReference:
         return ReferenceWalk(add_standing_angles(means[side], zero(), side), self._body, lead=side)
 
     def _norm(self) -> Mapping[str, Floats]:
-        """Curves of healthy adults at the speed of the last strides."""
-        told = list(self._strides.values())[-SPEED_OF:]
-        speeds = [v for s in told if (v := s.values.get("gait_speed_mps")) is not None]
+        """Curves of healthy adults at the speed of recent strides."""
+        strides = list(self._strides.values())[-SPEED_OF:]
+        speeds = [v for s in strides if (v := s.values.get("gait_speed_mps")) is not None]
         speed = float(np.mean(speeds)) if len(speeds) >= SPEED_FROM else None
         norm = self._norm_at(None if speed is None else SPEED_STEP_MPS * round(speed / SPEED_STEP_MPS))
         return norm if all(name in norm for name in SAGITTAL) else {}
 
 
 def average_curves(strides: Iterable[FeedStride]) -> dict[str, Floats]:
-    """Return variable → mean curve (n,) in rad of the last counted strides, of what all of them have."""
+    """Return variable → mean curve (n,) in rad of recent included strides, for variables present in all."""
     last = [s.curves_deg for s in strides if s.counted][-MEAN_OF:]
     if not last:
         return {}
     shared = set.intersection(*(set(curves) for curves in last))
-    found = {name: np.array([curves[name] for curves in last], np.float64).mean(axis=0) for name in shared}
-    return {name: np.radians(mean) for name, mean in found.items() if np.isfinite(mean).all()}
+    means = {name: np.array([curves[name] for curves in last], np.float64).mean(axis=0) for name in shared}
+    return {name: np.radians(mean) for name, mean in means.items() if np.isfinite(mean).all()}
 
 
 def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | None]) -> dict[str, float]:
-    """Return angle → rad while standing: what the poses of a moment give, less its angles from standing."""
+    """Return angle → rad in standing: absolute angles of a pose minus its angles relative to standing."""
     raw: dict[str, float] = {}
     q = dict(zip(moment.segments, moment.q, strict=True))
     if "pelvis" in q:
@@ -119,10 +119,10 @@ def find_standing_angles(moment: FigureMoment, angles_deg: Mapping[str, float | 
                 abc = cardan_zxy(multiply(conjugate(q[proximal]), q[distal])).tolist()
                 for (name, right, left), x in zip(SIGNS[joint], abc, strict=True):
                     raw[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * x
-    found = {
+    offsets = {
         name: x - np.radians(now) for name, x in raw.items() if (now := angles_deg.get(name)) is not None
     }
-    return {name: float((x + np.pi) % (2 * np.pi) - np.pi) for name, x in found.items()}
+    return {name: float((x + np.pi) % (2 * np.pi) - np.pi) for name, x in offsets.items()}
 
 
 def _other(side: Side) -> Side:

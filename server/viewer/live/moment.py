@@ -1,4 +1,4 @@
-"""One moment of a live figure."""
+"""One frame of a live avatar."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from sagittal.core.frames import Floats, Segment, Side
 
 @dataclass(frozen=True, eq=False)
 class FigureMoment:
-    """Poses at one time of a take.
+    """Poses at one time of a trial.
 
     Parameters
     ----------
-    t_s : s on the take's axis. segments : s of them. q : (s, 4) segment to W. p : (s, 3) m, as `Poses`.
-    valid : all segments of the figure are measured. contact : side → on the floor; a side that is not known
-        is missing. method : of the estimator, as `Poses.method`.
-    phase : side → 0 to 1 of the running cycle, None where unknown.
+    t_s : s on the trial's time axis. segments : s segments. q : (s, 4) segment to W. p : (s, 3) m, as
+        `Poses`.
+    valid : all segments are measured. contact : side → foot on the floor; unknown sides are missing. method :
+        of the estimator, as `Poses.method`.
+    phase : side → 0 to 1 of the current cycle, None if unknown.
     """
 
     t_s: float

@@ -1,1 +1,1 @@
-"""The figure of a recorded walk."""
+"""Avatar of a recorded walk."""

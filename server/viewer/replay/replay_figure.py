@@ -1,4 +1,4 @@
-"""A prepared motion as a viser scene: batched meshes in a room that may move past."""
+"""A precomputed motion as a viser scene: batched meshes in a movable room."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from sagittal.server.viewer.viser_adapter import show_at_once
 
 
 class ReplayFigure:
-    """A recorded walk in one viser server, posed at any time, with another walk laid over it.
+    """Avatar of a recorded walk in one viser server, posed at any time, with an optional overlay.
 
     Parameters
     ----------
-    server : a viser server of its own.
-    motion : prepared by `sagittal.server.viewer.motion.prepare_motion`. t_s : the moment shown first.
+    server : a dedicated viser server.
+    motion : prepared by `sagittal.server.viewer.motion.prepare_motion`. t_s : time shown first.
     """
 
     def __init__(
@@ -51,15 +51,15 @@ class ReplayFigure:
 
     @property
     def motion(self) -> ReplayMotion:
-        """The motion that is shown."""
+        """The displayed motion."""
         return self._motion
 
     def is_valid(self, t_s: float) -> bool:
-        """Tell whether all sensors were there at the frame nearest to `t_s`."""
+        """Whether all sensors were available at the frame nearest to `t_s`."""
         return bool(self._motion.valid[self._motion.index(t_s)])
 
     def pose(self, t_s: float) -> float:
-        """Show the frame nearest to `t_s`, send it at once, and return its time in s."""
+        """Show the frame nearest to `t_s`, send it immediately, and return its time in s."""
         m = self._motion
         i = m.index(t_s)
         self._t_s = float(m.t_s[i])
@@ -76,7 +76,7 @@ class ReplayFigure:
         return self._t_s
 
     def set_dark(self, dark: bool) -> None:
-        """Change all colours to the theme of the page around."""
+        """Change all colours to the theme of the embedding page."""
         self._dark = dark
         for part in self._drawn.values():
             part.handle.batched_colors = colour_copies(part.batch, dark)
@@ -87,14 +87,14 @@ class ReplayFigure:
         self._server.flush()
 
     def set_follow(self, follow: bool) -> None:
-        """Keep the person in the middle of the picture, or stand back and let the whole walk pass."""
+        """Keep the avatar centred, or show the whole walk from a distance."""
         self._follow = follow
         m = self._motion
         self._room.look(frame_person(m.size, m.facing) if follow else _whole(m))
         self.pose(self._t_s)
 
     def look_from(self, view: ViewName) -> None:
-        """Look at the person from a side, in the direction of the walk at this moment."""
+        """View the avatar from a side relative to the current walking direction."""
         m = self._motion
         if self._headings is None:
             self._headings = find_heading(m)
@@ -105,19 +105,19 @@ class ReplayFigure:
         self._server.flush()
 
     def set_ghost(self, name: GhostName | None) -> bool:
-        """Lay another walk over the figure, None = none; tell whether there is such a walk."""
-        found = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
+        """Overlay another walk, None = none; return whether it is available."""
+        overlay = self._motion.ghosts.get(name, lambda: None)() if name is not None else None
         for part in self._ghost.values():
             part.handle.remove()
-        self._matched, self._ghost = found, {}
-        if found is not None:
+        self._matched, self._ghost = overlay, {}
+        if overlay is not None:
             # each has names of its own: under a name in use the client may keep an older shader
             x, y = self._middle.tolist()
-            self._ghost = draw_ghost(self._server.scene, found.batches, f"_{name}", (x, y))
+            self._ghost = draw_ghost(self._server.scene, overlay.batches, f"_{name}", (x, y))
             for part in self._ghost.values():
                 part.handle.batched_colors = colour_copies(part.batch, self._dark, ghost=True)
         self.pose(self._t_s)
-        return found is not None
+        return overlay is not None
 
     def set_ground(self, visible: bool) -> None:
         """Show or hide footprints and trails."""
@@ -126,17 +126,17 @@ class ReplayFigure:
 
 
 def _whole(motion: ReplayMotion) -> CameraShot:
-    """From above, behind the start and right of the way, all of it in the picture."""
+    """Camera above and to the right of the start, with the whole walk in view."""
     sight = turn_about_vertical(motion.facing) @ np.array([0.62, 0.62, -0.48])
     right = np.cross(sight, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     half = np.append(np.ptp(motion.root, axis=0) / 2, motion.size) + 0.2
     corners = half * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
-    across, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
+    horizontal, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
     # how far back the eye must be for a corner to be inside a square picture of this angle
-    back = np.maximum(abs(across), abs(up)) / np.tan(FOV_RAD / 2) - ahead
-    at = np.array([0.0, 0.0, motion.size])
-    x, y, z = at - back.max() * sight
+    back = np.maximum(abs(horizontal), abs(up)) / np.tan(FOV_RAD / 2) - ahead
+    target = np.array([0.0, 0.0, motion.size])
+    x, y, z = target - back.max() * sight
     return CameraShot(
-        (0.0, 0.0, at[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0
+        (0.0, 0.0, target[2]), (float(x), float(y), float(z)), fade=2.5 * float(back.max()), section=5.0
     )

@@ -1,8 +1,8 @@
-"""What the walk leaves on the floor of a scene: footprints and the trails of the feet, up to a moment.
+"""Floor marks of a replay up to a given time: footprints and trails of the feet.
 
-A trail is cut into chunks that are sent once and only switched on; at a moment only the unfinished chunk is
-sent, so that a frame costs the same at the end of a long take as at its start. Close to the walker only the
-last strides are shown: of a corridor walked twenty times nothing could be told apart.
+A trail is divided into chunks that are sent once and then only made visible; at any time only the incomplete
+chunk is sent, so that the cost of a frame does not grow with the length of the trial. In close-up only the
+last strides are shown, since many passes through a corridor would overlap.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ _OPACITY = 0.6
 
 
 class ReplayFloor:
-    """Prints and trails of a motion in one scene.
+    """Footprints and trails of a motion in one scene.
 
     Parameters
     ----------
-    parent : name of the scene node that carries the room.
+    parent : name of the scene node of the room.
     """
 
     def __init__(self, scene: viser.SceneApi, parent: str, motion: ReplayMotion) -> None:
@@ -44,15 +44,15 @@ class ReplayFloor:
         self._shown = dict.fromkeys(parts, (0, True))
 
     def show(self, t_s: float, recent: bool) -> None:
-        """Show what has been left until a time, all of it or the last strides."""
-        for part, shown in self._shown.items():
+        """Show the marks up to a time, all of them or the last strides."""
+        for part, state in self._shown.items():
             count = int(np.searchsorted(part.t_s, t_s, side="right"))
-            if (count, recent) != shown:
+            if (count, recent) != state:
                 part.show(count, recent)
                 self._shown[part] = (count, recent)
 
     def set_dark(self, dark: bool) -> None:
-        """Change the colours to the theme of the page around."""
+        """Change the colours to the theme of the embedding page."""
         for part in self._shown:
             part.paint(TINTS[dark][part.side])
 

@@ -1,4 +1,4 @@
-"""Walks made of curves that can be laid over a replay: the norm at this speed, and one side for both legs."""
+"""Reference walks for overlay on a replay: the norm at this speed, or one side's curves for both legs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Curves = Mapping[str, Floats]
 def find_references(
     reviewed: ReviewedAnalyses, this: AnalysedSession, patient: Patient, motion: ReplayMotion
 ) -> dict[GhostName, Callable[[], GhostMotion | None]]:
-    """Return name → finds the walk when it is first asked for; None where curves or strides are missing."""
+    """Return name → function that computes the walk on first use; None if curves or strides are missing."""
 
     def match(curves: Curves, lead: Side) -> GhostMotion | None:
         if not all(name in curves for name in SAGITTAL):
@@ -33,8 +33,8 @@ def find_references(
 
     @cache
     def find_norm() -> GhostMotion | None:
-        known = find_norms(patient, this.session, reviewed.read_numbers(this.found, this.edits))
-        return match({name: np.radians(band.mean_deg) for name, band in known.bands.items()}, "left")
+        norms = find_norms(patient, this.session, reviewed.read_numbers(this.found, this.edits))
+        return match({name: np.radians(band.mean_deg) for name, band in norms.bands.items()}, "left")
 
     @cache
     def find_side(side: Side) -> GhostMotion | None:
@@ -45,11 +45,11 @@ def find_references(
 
 
 def _average_side(reviewed: ReviewedAnalyses, this: AnalysedSession, side: Side) -> Curves:
-    """Mean curves of the strides of a side that count, rad, with its standing angles put back."""
+    """Mean curves of a side's included strides, rad, with standing angles added."""
     bundle = reviewed.read_bundle(this.found, this.edits)
     if bundle.angles is None:
         return {}
     cycles = cycle_curves(bundle.angles, bundle.strides)
     means = {name: mean_curve(cycles, name, side).mean for name in cycles.curves}
-    known = {name: x for name, x in means.items() if x is not None and np.isfinite(x).all()}
-    return add_standing_angles(known, bundle.angles.zero_offset, side)
+    finite = {name: x for name, x in means.items() if x is not None and np.isfinite(x).all()}
+    return add_standing_angles(finite, bundle.angles.zero_offset, side)

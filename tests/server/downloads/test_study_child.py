@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 import msgspec
 import pytest
 
+from sagittal.core.user_text import encode_user_text
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Role
 from sagittal.server.downloads import study_child
@@ -17,7 +18,6 @@ from sagittal.server.downloads.studies import StudyChoice
 from sagittal.server.downloads.study_child import StudyReply
 from sagittal.server.processes.channel import Channel
 from sagittal.server.report.study_tables import PROVENANCE
-from sagittal.web.user_text import encode_user_text
 from tests.helpers.clinic import Clinic
 from tests.server import feedback
 

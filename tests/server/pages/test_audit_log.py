@@ -27,7 +27,7 @@ async def test_older_rows_are_a_page_further_until_there_are_none(clinic: Clinic
         assert pages == 2
         assert (await client.get("/audit?before=0")).status_code == 422
     with clinic.db.read() as c:
-        rows = audit.list_entries(c, before=None, limit=1000)
+        rows = audit.list_entries(c, before_seq=None, limit=1000)
     assert seen == [str(rows[AUDIT_ROWS - 1].seq)]
     async with clinic.client("clinician") as client:
         assert (await client.get("/audit")).status_code == 403

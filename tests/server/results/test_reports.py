@@ -40,7 +40,7 @@ def test_a_report_beside_an_earlier_visit_tells_changes(
 ) -> None:
     patient, (first, second) = course
     state = (stored.app.state.reviewed, second.found, second.edits, patient, second.session)
-    _, model = reports.read(*state, before=first)
+    _, model = reports.read(*state, previous=first)
     assert model.since is not None
     assert (model.since.session_id, model.since.performed_on) == (
         first.session.id,

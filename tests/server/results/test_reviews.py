@@ -41,7 +41,7 @@ def session_of(clinic: Clinic) -> str:
 
 
 def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.EditHistory:
-    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, seen=seen)[1]
+    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, base_version=seen)[1]
 
 
 def rows(clinic: Clinic) -> list[str]:

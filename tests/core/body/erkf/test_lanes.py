@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 RUN = """
 import hashlib, sys
 import numba
@@ -27,6 +29,7 @@ print(lanes.STEP, bits.hexdigest())
 """
 
 
+@pytest.mark.sweep
 def test_untested_versions_of_the_compiler_give_the_same_bits(tmp_path: Path) -> None:
     known, unknown = (
         subprocess.run(

@@ -190,6 +190,7 @@ def test_the_result_says_on_what_and_whether_it_is_better() -> None:
     assert json.loads(json.dumps(found.to_json(), allow_nan=False))["data_sha256"] == found.data_sha256
 
 
+@pytest.mark.slow
 def test_gains_that_only_fit_their_own_trials_are_not_recommended() -> None:
     """Trained where the accelerometer misleads, judged where it is exact and the gyroscope drifts."""
     noisy = trial("noisy", noise=0.0)

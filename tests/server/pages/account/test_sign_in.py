@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 
 from sagittal.server.auth import one_time
 from sagittal.server.auth.passwords import MIN_LENGTH
-from tests.helpers.clinic import Clinic
+from tests.helpers.clinic import Clinic, open_clinic
 
 pytestmark = pytest.mark.anyio
 
 
-async def test_the_first_account_is_asked_for_by_a_valid_address_alone(clinic: Clinic) -> None:
-    with clinic.db.write() as c:
-        token = one_time.issue_set_up(c)
-    async with clinic.client() as client:
-        valid, guessed = await client.get(f"/set-up/{token}"), await client.get("/set-up/guessed")
+async def test_the_first_account_is_requested_at_a_valid_address_only(tmp_path: Path) -> None:
+    async with open_clinic(tmp_path) as clinic:  # one without accounts
+        with clinic.db.write() as c:
+            token = one_time.issue_set_up(c)
+        async with clinic.client() as client:
+            valid, guessed = await client.get(f"/set-up/{token}"), await client.get("/set-up/guessed")
     assert valid.status_code == 200
     assert f"/api/v1/set-up/{token}" in valid.text
     assert f'minlength="{MIN_LENGTH}"' in valid.text

@@ -1,19 +1,18 @@
-"""Text that a person entered or uploaded, as a type: pages show it unchanged in every language."""
+"""User-entered or uploaded text as a type: pages show it unchanged in every language."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from html import escape
 from typing import Any, Final
-
-from markupsafe import Markup, escape
 
 
 class UserText(str):
-    """Text that a person entered or uploaded; it is never translated and its numbers are never localised.
+    """Text entered or uploaded by a user; never translated, nor are its numbers localised.
 
     Parts of it, changes of case and sums with other texts are user text too. An f-string, `format` and
-    `str.join` return a plain `str`: inside a sentence the text is put in quotation marks by `quote`, or given
-    to a message as a value.
+    `str.join` return a plain `str`: within a sentence, quote the text with `quote` or pass it to a message as
+    a value.
 
     >>> [type(text).__name__ for text in (UserText("Left knee")[:4], "Of " + UserText("Left"))]
     ['UserText', 'UserText']
@@ -21,13 +20,13 @@ class UserText(str):
 
     __slots__ = ()
 
-    def __html__(self) -> Markup:
+    def __html__(self) -> str:
         """Escape the text; templates that join it with their own words leave the result as it is."""
-        return escape(str(self))
+        return escape(str(self)).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
 
-    def __radd__(self, before: str) -> UserText:
-        """Return user text after another text."""
-        return UserText(before + str(self))
+    def __radd__(self, prefix: str) -> UserText:
+        """Return user text after concatenation with a preceding text."""
+        return UserText(prefix + str(self))
 
 
 def _keep_type(name: str) -> Callable[..., Any]:
@@ -51,7 +50,7 @@ for _name in _KEEPING:
 
 
 def mark_user_text(value: Any) -> Any:
-    """Mark every text of a value as user text, in lists and in mappings, whose keys are marked too.
+    """Mark all texts in a value as user text, including lists, mappings and their keys.
 
     >>> type(mark_user_text({"sensors": ["Left foot"]})["sensors"][0]).__name__
     'UserText'
@@ -66,20 +65,20 @@ def mark_user_text(value: Any) -> Any:
 
 
 def encode_user_text(value: object) -> str:
-    """Return user text as a plain string: the `enc_hook` of msgspec, which writes exact types only.
+    """Return user text or a message as a plain string: the `enc_hook` of msgspec, which knows exact types.
 
     Raises
     ------
     NotImplementedError
         The value is of another type that msgspec does not know.
     """
-    if isinstance(value, UserText):
+    if isinstance(value, str):
         return str(value)
     raise NotImplementedError(f"Objects of type {type(value).__name__} cannot be encoded.")
 
 
 def quote(text: str) -> str:
-    """Return user text in quotation marks, which no language looks into, for a sentence; else the text.
+    """Return user text in quotation marks, which are never translated; other text unchanged.
 
     >>> quote(UserText("Pain, left knee")), quote("too short")
     ('“Pain, left knee”', 'too short')
