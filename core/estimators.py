@@ -25,7 +25,7 @@ NO_FIGURE: Final = "none"
 """`Poses.method` where no estimator could run."""
 
 NO_FIGURE_LABEL: Final = "No figure"
-NO_FIGURE_NOTE: Final = "These sensors do not allow a figure; what they measure themselves is shown."
+NO_FIGURE_NOTE: Final = "These sensors do not allow an avatar; their own measurements are shown."
 
 LINKED_PATHS: Final = "erkf_smoothed"
 """`FootTracks.source` of feet that hang on one chain."""
@@ -131,10 +131,10 @@ ERKF: Final = PoseEstimator(
     leg_model=False,
     in_room=True,
     note=(
-        "An error-state Kalman filter ties all sensors together at the joints, holds each foot in place "
-        "while it rests, and goes through the take forwards and backwards (Potter). Angles are measured by "
-        "two sensors each; on a healthy walk flexion, hip and knee adduction were within 2 to 4° of optical "
-        "motion capture, strides within 2 cm."
+        "An error-state Kalman filter links all sensors at the joints, fixes each foot during foot-flat, "
+        "and runs forwards and backwards over the trial (Potter). Each angle is measured by two sensors; "
+        "in a healthy walk flexion and hip and knee adduction were within 2 to 4° of optical motion "
+        "capture, and stride lengths within 2 cm."
     ),
     paper=PaperReference(
         "Potter MV, Cain SM, Ojeda LV, Gurchiek RD, McGinnis RS, Perkins NC 2021. Error-state Kalman filter "
@@ -155,9 +155,10 @@ L7S_3I: Final = PoseEstimator(
     leg_model=True,
     in_room=True,
     note=(
-        "Thighs and shanks carry no sensor: they follow from the pelvis, the feet and the leg's length, with "
-        "knees and ankles as hinges (Sy). On a healthy walk estimated flexion was 4 to 7° from optical "
-        "motion capture, live 7 to 11°, so curves show the pattern, not small changes."
+        "Thighs and shanks have no sensor: they are derived from the pelvis, the feet and leg length, "
+        "with knees and ankles as hinges (Sy). In a healthy walk estimated flexion differed by 4 to 7° "
+        "from optical motion capture (live 7 to 11°), so the curves show the pattern but not small "
+        "changes."
     ),
     paper=SY_2021,
     science="docs/science/l7s.md",
@@ -175,9 +176,9 @@ L7S_2I: Final = PoseEstimator(
     leg_model=True,
     in_room=True,
     note=(
-        "Only the feet carry sensors: pelvis, thighs and shanks are estimated from them and the leg's length "
-        "(Sy). On a healthy walk estimated flexion was 5 to 9° from optical motion capture, live 8 to 11°; "
-        "the pelvis is taken to be level and to face between the feet."
+        "Only the feet have sensors: pelvis, thighs and shanks are estimated from them and leg length "
+        "(Sy). In a healthy walk estimated flexion differed by 5 to 9° from optical motion capture (live "
+        "8 to 11°); the pelvis is assumed to be level and to face midway between the feet."
     ),
     paper=SY_2021,
     science="docs/science/l7s.md",
@@ -195,9 +196,9 @@ ORIENTATIONS_ONLY: Final = PoseEstimator(
     leg_model=False,
     in_room=False,
     note=(
-        "Each sensor's orientation on its own, without the joints; the figure hangs on the foot that stands. "
-        "Flexion angles are measured all the same; frontal and transverse angles drift with each sensor's "
-        "heading."
+        "Each sensor's orientation is estimated separately, without joint constraints; the avatar is "
+        "placed on the stance foot. Flexion angles are still measured; frontal and transverse angles "
+        "drift with each sensor's heading."
     ),
     paper=None,
     science="docs/science/body-model.md",
@@ -209,15 +210,15 @@ ESTIMATORS: Final = (ERKF, L7S_3I, L7S_2I, ORIENTATIONS_ONLY)
 SQUAT_CHAIN: Final = PoseMethod(
     method="squat_chain",
     label="Chain of the squatting leg",
-    needs="the pelvis, and shank and thigh of each leg that squats",
+    needs="the pelvis, and the shank and thigh of each squatting leg",
     sets=tuple(frozenset[Segment](("pelvis", THIGH[s], SHANK[s])) for s in SIDES),
     sensors=("pelvis", *(x for s in SIDES for x in (THIGH[s], SHANK[s]))),
     leg_model=False,
     in_room=False,
     note=(
-        "Seven hinges from a foot that stands still to the pelvis, followed by one filter per sensor "
-        "(Kianifar). The foot carries no sensor: it is taken to stand flat, and a lifted one is drawn at a "
-        "right angle to the shin."
+        "Seven hinges from the stationary foot to the pelvis, estimated with one filter per sensor "
+        "(Kianifar). The foot has no sensor: it is assumed flat, and a lifted foot is drawn at a right "
+        "angle to the shank."
     ),
     paper=PaperReference(
         "Kianifar R, Joukov V, Lee A, Raina S, Kulić D 2019. Inertial measurement unit-based pose "

@@ -48,7 +48,7 @@ class NodeAway(ServiceError):  # noqa: N818 - what the person reads
     def __init__(self, name: str | None) -> None:
         super().__init__(
             NODE_AWAY,
-            f"This live take is on the server '{name}', which is away. Try again in a moment.",
+            f"This live recording runs on server '{name}', which is unavailable. Try again in a moment.",
         )
 
 

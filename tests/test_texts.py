@@ -112,7 +112,7 @@ COUNT: Final = re.compile(
 """A count and its noun. Of a range and of a limit the noun is always in the plural, of a constant too."""
 
 SINGULAR: Final = {
-    "are": "is", "batches": "batch", "copies": "copy", "count": "counts", "do": "does",
+    "are": "is", "batches": "batch", "copies": "copy", "count": "included", "do": "does",
     "follow": "follows", "have": "has", "lack": "lacks", "say": "says", "stand": "stands", "stay": "stays",
     "stretches": "stretch", "were": "was",
 }  # fmt: skip
@@ -122,20 +122,21 @@ MORE_THAN_ONE: Final = (
     # constants of the product and settings with a least value
     "{film_minutes} minutes", "{gyro_noise} times", "{filters} filters", "{hours} hours", "{window} strides",
     "{strides_per_share} strides", "Expected {0} samples a second", "{1} steps, {2} s",
-    "{0} steps", "A decision on the level needs {0} strides", "{steps} straight steps are needed",
+    "{0} steps", "{0} strides are needed to adjust", "{steps} straight steps are needed",
     # groups of people that norms and limits are made of
     "{norm_n} people", "{people} people", "{controls} people", "{first} years",
     # differences beyond measurement error, in steps a minute or in percent of a stride
     "{value} times its usual",
     # shown or refused because there are several
-    "{takes} takes", "in {still} parts", "{segments} sensors are there", "{chosen} visits fit",
-    "{t_s} days; at most", "{days} days, expected", "{value} samples at {rate} Hz", "{value} samples of {id}",
+    "in {still} parts", "{segments} sensors are available", "{chosen} visits match",
+    "{t_s} days; at most", "{days} days; expected", "{value} samples at {rate} Hz", "samples of {id}",
+    "{count} samples of {device}", "starts again after {wrap} samples",
     "The file has {size} bytes", "announced with {size} bytes", "{offset} of {size} bytes",
     # "4 left and 1 right strides"
-    "{counted} strides",
+    "{cycle_counts} strides",
     # the wording for one does without the number
     "{n} more times after this test", "{copies} sensors are copies",
-    "passes all {judged} checks",
+    "all {checked} checks passed", "{value} cues were excluded",
 )  # fmt: skip
 """Parts of messages whose count is never one, or is not given where it is one."""
 
@@ -194,8 +195,8 @@ def test_no_text_has_an_ending_in_brackets(language: str) -> None:
 @pytest.mark.parametrize(
     ("english", "german"),
     [
-        ("1 more stands out", "1 weitere Auffälligkeit"),
-        ("2 more stand out", "2 weitere Auffälligkeiten"),
+        ("1 more finding", "1 weitere Auffälligkeit"),
+        ("2 more findings", "2 weitere Auffälligkeiten"),
         ("1 more change", "1 weitere Veränderung"),
         (
             "0.62\u202fm, mean ± SD of 1 stride",
@@ -258,10 +259,10 @@ def test_messages_are_found_in_scripts() -> None:
         ("slow", "langsam"),
         ("fast", "schnell"),
         (
-            "Clock runs slow, 12\u202fms over the take, left so",
+            "Clock runs slow, 12\u202fms over the trial, not corrected",
             "Uhr läuft zu langsam, 12\u202fms über die Aufnahme, so belassen",
         ),
-        ("Clock 12\u202fms late, put right", "Uhr 12\u202fms zu spät, richtiggestellt"),
+        ("Clock 12\u202fms late, corrected", "Uhr 12\u202fms zu spät, richtiggestellt"),
         ("Right hip, in the pelvis", "Hüfte rechts, im Segment Becken"),
         ("Left ankle, in the left shank", "Sprunggelenk links, im Segment Unterschenkel links"),
         ("Gravity reads 2 % more since 23 Nov 2026", "Schwerkraft: 2 % mehr seit 23.11.2026"),
@@ -271,14 +272,20 @@ def test_messages_are_found_in_scripts() -> None:
             "against the other side and people at this speed",
             "gegen die andere Seite und Menschen in diesem Tempo",
         ),
-        ("112 strides used, 56 left and 56 right.", "112 Doppelschritte verwendet, 56 links und 56 rechts."),
+        (
+            "112 strides included, 56 left and 56 right.",
+            "112 Doppelschritte verwendet, 56 links und 56 rechts.",
+        ),
         (
             "Knee flexion in swing is *18° less on the left* (38° vs 56°, norm 57 ± 5°)",
             "Knieflexion in der Schwungphase: *links 18° weniger* (38° gegenüber 56°, Norm 57 ± 5°)",
         ),
-        ("Knee flexion, swing peak, from standing", "Knieflexion, Gipfel der Schwungphase, vom Stand aus"),
         (
-            "within measurement error; includes how the person stood",
+            "Peak knee flexion in swing, relative to standing",
+            "Knieflexion, Gipfel der Schwungphase, vom Stand aus",
+        ),
+        (
+            "within measurement error; includes the standing posture",
             "innerhalb des Messfehlers; enthält, wie die Person stand",
         ),
         (
@@ -323,13 +330,13 @@ def test_what_a_person_typed_stays_as_it_is() -> None:
 def test_what_a_sentence_quotes_stays_as_it_is(typed: str) -> None:
     said = DE.translate(f"The code '{typed}' belongs to another patient; choose a new one.")
     assert said == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
-    stride = DE.translate(f"left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}")
+    stride = DE.translate(f"left stride, 1.50 to 2.25 s, excluded: {quote(UserText(typed))}")
     assert stride == f"Doppelschritt links, 1,50 bis 2,25 s, ausgelassen: „{typed}“"
-    figure = f"<title>left stride, 1.50 to 2.25 s, left out: {quote(UserText(typed))}</title>"
+    figure = f"<title>left stride, 1.50 to 2.25 s, excluded: {quote(UserText(typed))}</title>"
     assert Shown(DE).say_figure(figure) == f"<title>{stride}</title>"
     nested = f"say “{typed}” twice"
-    assert DE.translate(f"left stride, 1.50 to 2.25 s, left out: “{nested}”").endswith(f"„{nested}“")
-    missing = DE.translate(f"No trial “{typed}”, “{typed}” among the session's files.")
+    assert DE.translate(f"left stride, 1.50 to 2.25 s, excluded: “{nested}”").endswith(f"„{nested}“")
+    missing = DE.translate(f"There is no trial “{typed}”, “{typed}” among the visit's files.")
     assert missing == f"Unter den Dateien der Sitzung fehlt die Aufnahme „{typed}“, „{typed}“."
     low = f"Sensor {typed} has no sample with both acceleration and angular rate; export it again."
     assert f"Sensor {typed} " in DE.translate(low)
@@ -373,15 +380,15 @@ def test_a_level_that_an_estimator_lowers_is_said(language: str) -> None:
 
 
 def test_a_sum_in_a_sentence_is_one_value() -> None:
-    few = "3 steps were found, nowhere 6 without a break: no walking bout is reported. Record a longer walk."
+    few = "3 steps detected, but never 6 in a row: no walking bout is reported. Record a longer walk."
     assert DE.translate(few).startswith("3 Schritte wurden gefunden, nirgends 6 ohne Pause:")
     assert DE.translate("Day 3") == "Tag 3"
 
 
 def test_what_a_helper_refuses_is_said_as_a_whole() -> None:
     refused = (
-        "left thigh: it bends about an axis 81° off the agreed one; limit 35°. Put the sensor on as agreed, "
-        "or calibrate from the table."
+        "left thigh: its flexion axis is 81° off the specified one; limit 35°. Attach the sensor as "
+        "specified in the protocol, or calibrate from the table."
     )
     assert DE.translate(refused) == (
         "Oberschenkel links: es beugt um eine Achse, die 81° von der vereinbarten abweicht; Grenze 35°. "

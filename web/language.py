@@ -79,7 +79,8 @@ class Catalogue:
 
     @functools.cached_property
     def _sentences(self) -> SentenceFinder:
-        return SentenceFinder(self.messages, self._values)
+        earlier = {old: self.messages[new] for old, new in read_earlier().items() if new in self.messages}
+        return SentenceFinder({**earlier, **self.messages}, self._values)
 
     def find(self, text: str) -> str | None:
         """A text in this language; None where no part of it is made from a message."""
@@ -125,6 +126,13 @@ def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
         for entry in read_po(file):
             if entry.id and entry.string:
                 yield str(entry.id), str(entry.string), frozenset(name for name, _ in entry.locations)
+
+
+@functools.cache
+def read_earlier() -> Mapping[str, str]:
+    """Earlier wording of messages → current wording; results of earlier versions hold finished sentences."""
+    wordings: dict[str, str] = json.loads((TEXTS / "earlier.json").read_text("utf-8"))
+    return wordings
 
 
 def catalogue_path(language: str) -> Path:

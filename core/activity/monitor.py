@@ -377,8 +377,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
             Notice(
                 "height_assumed",
                 Message(
-                    "Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. It decides how far a "
-                    "chest must rise for getting up.",
+                    "Body height is missing; {NOMINAL_HEIGHT_M:.2f} m is assumed. It determines how far the "
+                    "chest must rise to count as standing up.",
                     NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
                 ),
                 severity="info",
@@ -389,8 +389,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "no_baseline",
-                "Nobody walked and nobody held still for 5 s: which way is up is not known. Postures are "
-                "left open; record some walking.",
+                "No walking and no still period of 5 s detected, so the vertical is unknown. Postures are "
+                "not classified; include some walking in the recording.",
                 stream.device_id,
             )
         )
@@ -398,8 +398,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "baseline_assumed",
-                "Without walking the first 5 s of rest are taken as upright. Where the person lay then, all "
-                "postures are wrong.",
+                "No walking detected, so the first 5 s of rest are assumed to be upright. If the person was "
+                "lying then, all postures are wrong.",
                 stream.device_id,
             )
         )
@@ -407,8 +407,8 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         told.append(
             Notice(
                 "forward_unknown",
-                "In some time worn no lean showed where forward is: inclination there has no sign and is "
-                "left out.",
+                "During part of the wear time no trunk lean showed the forward direction; inclination has no "
+                "sign there and is excluded.",
                 stream.device_id,
                 severity="info",
             )

@@ -38,8 +38,8 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
         return Notice(
             "clocks_disagree",
             Message(
-                "{said}. One joint alone shows it, so nothing was shifted. Synchronise the sensors "
-                "and record again.",
+                "{said}. Only one joint shows this, so nothing was shifted. Synchronise the sensors and "
+                "record again.",
                 said=said,
             ),
             lag.sensors[0],
@@ -48,21 +48,23 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
         return Notice(
             "sensor_late",
             Message(
-                "{said}. It was left so, as this analysis was told to. Angles beside it are wrong.", said=said
+                "{said}. It was not corrected, as this analysis was set to. Adjacent joint angles are wrong.",
+                said=said,
             ),
             lag.sensors[0],
         )
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            Message("{said}; its samples were shifted by that. {KEPT}", said=said, KEPT=KEPT),
+            Message("{said}; its samples were shifted accordingly. {KEPT}", said=said, KEPT=KEPT),
             lag.sensors[0],
             severity="info",
         )
     return Notice(
         "sensor_late",
         Message(
-            "{said}; its samples were shifted by that. Synchronise the sensors before the next take. {KEPT}",
+            "{said}; its samples were shifted accordingly. Synchronise the sensors before the next "
+            "trial. {KEPT}",
             said=said,
             KEPT=KEPT,
         ),
@@ -74,12 +76,12 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
     """Notice about a clock that runs slow or fast."""
     ms, sd = 1e3 * abs(drift.change_s), 1e3 * drift.sd_s
     which = "slow" if drift.change_s > 0 else "fast"
-    done = "its samples were laid where they belong. " if params.repair else "it was left so. "
+    done = "its samples were realigned. " if params.repair else "it was not corrected. "
     return Notice(
         "clock_drifts",
         Message(
-            "The clock of {sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; {done}Synchronise "
-            "the sensors before the next take. {KEPT}",
+            "The clock of {sensor} runs {which}, by {ms:.0f} ± {sd:.0f} ms over the walk; "
+            "{done}Synchronise the sensors before the next trial. {KEPT}",
             sensor=drift.sensor,
             which=which,
             ms=ms,
@@ -94,15 +96,16 @@ def tell_drift(drift: SensorDrift, params: LagParams) -> Notice:
 def say_exchange(exchange: SensorExchange) -> str:
     """Message about swapped sensors."""
     whose = " and ".join(f"{a} with {b}" for a, b in exchange.swap)
-    return Message("The joints show that sensors are exchanged: {whose}.", whose=whose)
+    return Message("Joint motion shows that sensors are swapped: {whose}.", whose=whose)
 
 
 def tell_exchange(exchange: SensorExchange, params: ExchangeParams) -> Notice:
     """Notice about swapped sensors."""
     done = (
-        "The take was analysed with them the right way round. Look who wears what and correct it."
+        "The trial was analysed with the corrected assignment. Check the sensors on the person and "
+        "correct the assignment."
         if params.repair
-        else "Nothing was changed, as this analysis was told to. Correct who wears what."
+        else "Nothing was changed, as this analysis was set to. Correct the sensor assignment."
     )
     return Notice(
         "sensors_exchanged",
@@ -135,18 +138,21 @@ def say_slip(slip: SensorSlip) -> str:
 def tell_slip(slip: SensorSlip, params: SlipParams) -> Notice:
     """Notice about a slipped sensor, with time, angle and consequences."""
     if not params.repair:
-        done = "It was left so, as this analysis was told to. Angles beside it are withheld from there on."
+        done = (
+            "It was not corrected, as this analysis was set to. Adjacent joint angles are not reported "
+            "from then on."
+        )
     elif slip.at_rest:
-        done = "It is left out, as if it were not worn. Fasten it and record again."
+        done = "It is excluded as if not worn. Fasten it and record again."
     elif slip.is_repaired:
         done = Message(
-            "Angles beside it are left out within {within_s:.0f} s of that; what came after was "
-            "turned back. Fasten it before the next take.",
+            "Adjacent joint angles within {within_s:.0f} s of the slip are excluded; later samples were "
+            "corrected. Fasten it before the next trial.",
             within_s=slip.within_s,
         )
     else:
         done = Message(
-            "From {max:.0f} s on it is left out, as if it were not worn. Fasten it and record again.",
+            "From {max:.0f} s on it is excluded as if not worn. Fasten it and record again.",
             max=max(slip.at_s - slip.within_s, 0.0),
         )
     return Notice(
@@ -162,8 +168,8 @@ def tell_left_over(lag: SensorLag) -> Notice:
     return Notice(
         "clocks_disagree",
         Message(
-            "After the repair {sensors} still seems {abs:.0f} ms off the others. Angles beside "
-            "it are doubtful; synchronise the sensors and record again.",
+            "After correction {sensors} still appears {abs:.0f} ms out of sync with the others. Adjacent "
+            "joint angles are unreliable; synchronise the sensors and record again.",
             sensors=list_sensors(lag.sensors),
             abs=1e3 * abs(lag.lag_s),
         ),

@@ -27,18 +27,18 @@ CLOCK_AGREES: Final = "The clock of {sensors} agrees with the others now."
 def tell_lag_now(lag: SensorLag, params: LagParams, t_s: float) -> Notice:
     """Notice about a late clock."""
     if not lag.sure:
-        todo = "One joint alone shows it. Synchronise the sensors and record again."
+        todo = "Only one joint shows this. Synchronise the sensors and record again."
         return Notice(
             "clocks_disagree", Message("{lag}. {todo}", lag=say_lag(lag), todo=todo), lag.sensors[0], t_s
         )
-    todo = "Angles beside it are wrong while they are shown live; the analysis of the take puts them right."
+    todo = "Adjacent joint angles are wrong in the live view; the analysis of the trial corrects them."
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late", Message("{lag}. {todo}", lag=say_lag(lag), todo=todo), lag.sensors[0], t_s, "info"
         )
     return Notice(
         "sensor_late",
-        Message("{lag}. {todo} Synchronise the sensors before the next take.", lag=say_lag(lag), todo=todo),
+        Message("{lag}. {todo} Synchronise the sensors before the next trial.", lag=say_lag(lag), todo=todo),
         lag.sensors[0],
         t_s,
     )
@@ -49,8 +49,8 @@ def tell_exchange_now(exchange: SensorExchange, t_s: float) -> Notice:
     return Notice(
         "sensors_exchanged",
         Message(
-            "{exchange} The live figure is wrong; the analysis of the take puts it right. "
-            "Correct who wears what and calibrate again.",
+            "{exchange} The live avatar is wrong; the analysis of the trial corrects it. Correct the "
+            "sensor assignment and calibrate again.",
             exchange=say_exchange(exchange),
         ),
         exchange.swap[0][0],
@@ -63,7 +63,7 @@ def tell_slip_now(slip: SensorSlip) -> Notice:
     return Notice(
         "sensor_slipped",
         Message(
-            "{slip} Angles beside it are wrong from there on. Fasten the sensor and calibrate again.",
+            "{slip} Adjacent joint angles are wrong from then on. Fasten the sensor and calibrate again.",
             slip=say_slip(slip),
         ),
         slip.segment,

@@ -71,8 +71,8 @@ def measure_angles(
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
     for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
         message = Message(
-            "{name}: no angle, its sensors have no signal while standing ({zero:.1f} to {zero2:.1f} "
-            "s), so there is no zero.",
+            "{name}: no angle, because its sensors have no signal during quiet standing ({zero:.1f} to "
+            "{zero2:.1f} s) and the zero is undefined.",
             name=name,
             zero=zero[0],
             zero2=zero[1],
@@ -114,7 +114,7 @@ def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> lis
                 continue
             missing = [s for s in (proximal, distal) if s not in orientations.q]
             message = Message(
-                "{side} {joint}: no angles, no sensor on {missing}; wear or map one there.",
+                "{side} {joint}: no angles, because there is no sensor on {missing}; attach or assign one.",
                 side=side,
                 joint=joint,
                 missing=" and ".join(missing),
@@ -134,8 +134,8 @@ def _find_gimbal(locked: Bools, kernel: AngleKernel, t_s: Floats) -> list[Notice
             beyond = locked[:, kernel.names.index(frontal)]
             if beyond.any():
                 message = Message(
-                    "{side} {joint}: the frontal angle passes 80° in {mean:.1%} of the take; there flexion "
-                    "and rotation cannot be told apart; check which segment each sensor is on.",
+                    "{side} {joint}: the frontal angle exceeds 80° in {mean:.1%} of the trial, where "
+                    "flexion and rotation cannot be separated; check which segment each sensor is on.",
                     side=side,
                     joint=joint,
                     mean=beyond.mean(),

@@ -93,8 +93,8 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     if out:
         places = sorted({_place(name) for name in out})
         message = Message(
-            "Angles of {places} are withheld: the sensors contradict each other there. Check sides, "
-            "segments and mounting, then calibrate again.",
+            "Angles of {places} are not reported because the sensors contradict each other. Check sides, "
+            "segments and alignment, then calibrate again.",
             places=", ".join(places),
         )
         notices = (*notices, Notice("angles_withheld", message))
@@ -150,7 +150,7 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
         else ("the path does not fit its rests on the floor", "Fasten the sensor and check for lost samples")
     )
     message = Message(
-        "Distances of {whose} are withheld: {why}. {todo}, then record again.",
+        "Distances of {whose} are not reported: {why}. {todo}, then record again.",
         whose=whose,
         why=why,
         todo=todo,

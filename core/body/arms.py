@@ -263,9 +263,9 @@ def report_ahead(arms: MeasuredArms) -> tuple[Notice, ...]:
     if not _is_turned(arms.ahead, arms.ahead_sd):
         return ()
     message = Message(
-        "The sensors sit as if every forward axis were turned by about {degrees:.0f}° to the "
+        "The sensor positions suggest that all anterior axes are rotated by about {degrees:.0f}° to the "
         f"{'right' if arms.ahead > 0.0 else 'left'}. Frontal and transverse angles are "
-        "doubtful. Check where the sensors sit and that the person walked ahead.",
+        "unreliable. Check sensor placement and that the person walked forward.",
         degrees=degrees(abs(arms.ahead)),
     )
     return (Notice("forward_against_places", message, severity="warning"),)

@@ -116,8 +116,8 @@ def _without_standing(
         raise EstimationError(
             "estimator_impossible",
             Message(
-                "The estimator {requested} begins with standing, and nobody stands still in this "
-                "take. Let it be chosen, or record 3 s of standing.",
+                "The estimator {requested} starts from quiet standing, but this trial has none. Use "
+                "automatic choice, or record 3 s of quiet standing.",
                 requested=requested,
             ),
         )
@@ -130,9 +130,9 @@ def _report_failed(
     notices = []
     for s in failed:
         message = Message(
-            "The {value} sensor can be used for {share:.0%} of the take, {need:.0%} is needed, so "
-            "it is left out: angles of its joints are missing or estimated. Charge, fasten or "
-            "replace it and record again.",
+            "The {value} sensor is usable for {share:.0%} of the trial but {need:.0%} is required, so it "
+            "is excluded: angles of its joints are missing or estimated. Charge, fasten or replace it "
+            "and record again.",
             value=s,
             share=share[s],
             need=need[s],
@@ -144,7 +144,7 @@ def _report_failed(
 def _impossible(requested: Requested, working: tuple[Segment, ...]) -> str:
     need = BY_NAME[requested].needs
     return Message(
-        "The estimator {requested} needs sensors on {need}; working: {join}. Choose another estimator.",
+        "The estimator {requested} requires sensors on {need}; working: {join}. Choose another estimator.",
         requested=requested,
         need=need,
         join=", ".join(working) or "none",

@@ -50,8 +50,9 @@ from sagittal.core.signals.held_samples import lay_aside
 from sagittal.core.signals.memory import give_memory_back
 
 ON_A_BELT: Final = (
-    "On a treadmill a foot on the belt does not rest in the room, as the estimator takes it to. Positions "
-    "are those on a belt of constant speed; distances are given only where the belt's speed was entered."
+    "On a treadmill the stance foot moves with the belt, whereas the estimator assumes it is stationary. "
+    "Positions are relative to a belt of constant speed; distances are reported only if the belt speed "
+    "was entered."
 )
 
 

@@ -70,8 +70,8 @@ def nominal_body(
     if height_m is not None:
         return body, ()
     message = Message(
-        "Body height is not given; the figure is drawn with {assumed_m:.2f} m. Enter the "
-        "height to see true proportions and distances; joint angles do not depend on it.",
+        "Body height is missing; the avatar is drawn with {assumed_m:.2f} m. Enter the height for true "
+        "proportions and distances; joint angles do not depend on it.",
         assumed_m=assumed_m,
     )
     return body, (Notice("height_assumed", message, severity="info"),)
@@ -191,13 +191,13 @@ def incomplete_legs(orientations: Orientations, legs: list[Side]) -> tuple[Notic
     """Notices `figure_incomplete` for sensors that do not contribute to these legs."""
     notices = []
     if "pelvis" not in orientations.q:
-        message = "No figure: without a pelvis sensor the legs have nothing to hang on; wear one there."
+        message = "No avatar: the legs cannot be placed without a pelvis sensor; attach one."
         notices.append(Notice("figure_incomplete", message, sensor="pelvis"))
     for side in SIDES:
         missing = [x for x in (THIGH[side], SHANK[side], FOOT[side]) if x not in orientations.q]
         if side not in legs and len(missing) < 3:
             message = Message(
-                "The {side} leg is left out of the figure, no sensor on {missing}.",
+                "The {side} leg is missing from the avatar because there is no sensor on {missing}.",
                 side=side,
                 missing=" and ".join(missing),
             )

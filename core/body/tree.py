@@ -92,7 +92,7 @@ class ImuTree:
             twice = next(s for s in self.imus if self.imus.count(s) > 1)
             raise EstimationError(
                 "duplicate_segment",
-                Message("{twice} carries two sensors; set one of them aside.", twice=twice),
+                Message("{twice} has two sensors; exclude one of them.", twice=twice),
                 sensor=twice,
             )
         for name, a, width in (
@@ -129,8 +129,8 @@ class ImuTree:
                     raise EstimationError(
                         "segment_length",
                         Message(
-                            "{name} lies at {round} m from its sensor, expected within {LONGEST_M:g} m; "
-                            "check the body model's units.",
+                            "{name} is {round} m from its sensor, expected within {LONGEST_M:g} m; "
+                            "check the units of the body model.",
                             name=joint.name,
                             round=np.round(r, 3).tolist(),
                             LONGEST_M=LONGEST_M,
@@ -199,8 +199,8 @@ def _check_mounts(mounts: Mapping[Segment, Floats], segments: Sequence[Segment])
         raise EstimationError(
             "segments_missing",
             Message(
-                "{len} of {segments} sensors are there, missing: {missing}; choose an estimator for "
-                "the sensors worn.",
+                "{len} of {segments} sensors are available, missing: {missing}; choose an estimator that "
+                "suits the available sensors.",
                 len=len(segments) - len(missing),
                 segments=len(segments),
                 missing=", ".join(missing),

@@ -113,9 +113,9 @@ def find_anterior_axis(
             raise CalibrationError(
                 "no_walking",
                 Message(
-                    "{segment}: no straight walking of 1.5 s or more was found and no mounting is "
-                    "declared. Record at least 8 steps straight ahead, or declare the mounting: "
-                    "“lateral, face right”.",
+                    "{segment}: no straight walking of at least 1.5 s detected and no placement "
+                    "declared. Record "
+                    "at least 8 steps straight ahead, or declare the placement: “lateral, face right”.",
                     segment=segment,
                 ),
                 sensor=segment,
@@ -130,9 +130,9 @@ def find_anterior_axis(
         raise CalibrationError(
             "calibration_sign_conflict",
             Message(
-                "{segment}: the walk and the declared mounting “{declared}” differ by {abs:.0f}°, allowed "
-                "are {CONFLICT:.0f}°. Correct the mounting in the manifest, or the segment this "
-                "sensor is mapped to.",
+                "{segment}: the walk and the declared placement “{declared}” differ by {abs:.0f}° (allowed: "
+                "{CONFLICT:.0f}°). Correct the placement in the manifest, or the segment assigned to this "
+                "sensor.",
                 segment=segment,
                 declared=declared,
                 abs=abs(degrees(subtract_angles(found.angle, written))),
@@ -268,9 +268,9 @@ def _tell_uncertain(segment: Segment, sd: float, limit: float) -> Notice:
     return Notice(
         "forward_uncertain",
         Message(
-            "{segment}: its way forward is known to ± {sd:.0f}° only; ± {limit:.0f}° is good. Frontal "
-            "and transverse angles there are doubtful. Start straight ahead from standing and "
-            "walk further.",
+            "{segment}: the forward direction is known only to ± {sd:.0f}° (good: ± {limit:.0f}°). "
+            "Frontal and transverse angles are unreliable there. Start walking straight ahead from "
+            "standing and walk further.",
             segment=segment,
             sd=degrees(sd),
             limit=degrees(limit),
@@ -307,8 +307,8 @@ def _by_gyro(
             Notice(
                 "not_single_axis",
                 Message(
-                    "{segment}: the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} or "
-                    "more is good; the flexion axis may be off by 10° and more.",
+                    "{segment}: the first principal component explains {rho:.0%} of the movement (good: "
+                    "{GOOD_AXIS:.0%} or more); the flexion axis may be off by 10° or more.",
                     segment=segment,
                     rho=axis.rho,
                     GOOD_AXIS=GOOD_AXIS,
@@ -333,8 +333,8 @@ def _signed(
         raise CalibrationError(
             "pelvis_heading_unknown",
             Message(
-                "{segment}: which way it faces is not known, no standing is next to the walk. Stand "
-                "still for 3 s directly before walking, or declare the mounting, for example "
+                "{segment}: its facing direction is unknown because there is no quiet standing next to the "
+                "walk. Stand still for 3 s directly before walking, or declare the placement, for example "
                 "“sacrum, face backwards”.",
                 segment=segment,
             ),
@@ -345,9 +345,9 @@ def _signed(
         weak = Notice(
             "calibration_sign_weak",
             Message(
-                "{segment}: forward and backward swing differ by {degrees:.1f}° only, at least "
-                "{WEAK_MARGIN:.0f}° decide which way is forward. Check the sign of the curves, or declare "
-                "the mounting.",
+                "{segment}: forward and backward swing differ by only {degrees:.1f}°; at least "
+                "{WEAK_MARGIN:.0f}° are needed to determine the forward direction. Check the sign of the "
+                "curves, or declare the placement.",
                 segment=segment,
                 degrees=degrees(abs(margin)),
                 WEAK_MARGIN=degrees(WEAK_MARGIN),
@@ -377,8 +377,8 @@ def _sign_notices(
         Notice(
             "calibration_sign_conflict",
             Message(
-                "{segment}: it swings {degrees:.0f}° further to the side where gait swings less. "
-                "Check that it is mapped to the right segment and that the walk was forwards.",
+                "{segment}: it swings {degrees:.0f}° further in the direction in which it should swing less. "
+                "Check that it is assigned to the right segment and that the person walked forwards.",
                 segment=segment,
                 degrees=degrees(-margin),
             ),

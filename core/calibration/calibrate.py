@@ -75,8 +75,8 @@ NO_WAY = (
 )
 
 NO_STANDING = (
-    "No standing found: the person only paused in mid-stride. Let them stand still for 3 to 5 s with both "
-    "feet side by side, before or after walking."
+    "No quiet standing detected: the person only paused mid-stride. Ask them to stand still for 3 to 5 s "
+    "with both feet side by side, before or after walking."
 )
 
 
@@ -132,7 +132,7 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     """
     params = params or CalibrationParams()
     if not recording.sensors:
-        raise CalibrationError("no_segment", "No sensor is mapped to a segment; map at least one foot.")
+        raise CalibrationError("no_segment", "No sensor is assigned to a segment; assign at least one foot.")
     try:
         rests = find_rests(recording, params.rest)
     except SignalError as why:
@@ -212,8 +212,8 @@ def _calibrate_at(
     steps = _straight_steps(found, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
         message = Message(
-            f"Calibration saw about {{steps}} straight {plural(steps, 'step', 'steps')}, {{FEW_STEPS}} "
-            "or more are good; walk further straight.",
+            f"Calibration used about {{steps}} straight {plural(steps, 'step', 'steps')}; {{FEW_STEPS}} "
+            "or more are recommended. Walk further straight ahead.",
             steps=steps,
             FEW_STEPS=FEW_STEPS,
         )

@@ -219,8 +219,8 @@ def _sign(
         raise CalibrationError(
             "pelvis_heading_unknown",
             Message(
-                "{segment}: which way it faces is not known without standing. Stand still for 3 s "
-                "before walking, or declare the mounting, for example “sacrum, face backwards”.",
+                "{segment}: its facing direction is unknown without quiet standing. Stand still for 3 s "
+                "before walking, or declare the placement, for example “sacrum, face backwards”.",
                 segment=segment,
             ),
             sensor=segment,
@@ -243,8 +243,8 @@ def _sign(
         raise CalibrationError(
             "forward_unknown",
             Message(
-                "{segment}: which way is forward cannot be told from it alone. Wear a sensor on the "
-                "shank or foot of that leg, or declare the mounting.",
+                "{segment}: the forward direction cannot be determined from this sensor alone. Attach a "
+                "sensor to the shank or foot of that leg, or declare the placement.",
                 segment=segment,
             ),
             sensor=segment,
@@ -266,8 +266,8 @@ def _weak(segment: Segment) -> Notice:
     return Notice(
         "calibration_sign_weak",
         Message(
-            "{segment}: forward and backward are hard to tell apart in this walk. Declare the "
-            "mounting, or check the sign of its angles.",
+            "{segment}: forward and backward are hard to distinguish in this walk. Declare the "
+            "placement, or check the sign of its angles.",
             segment=segment,
         ),
         sensor=segment,

@@ -46,13 +46,13 @@ from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import Window, find_runs
 
 FROM_WALKING: Final = (
-    "Nobody stood still, so sensors were calibrated from walking: joint angles have ranges, no levels. Stand "
-    "still for 3 seconds next time."
+    "No quiet standing detected, so the sensors were calibrated from walking: joint angle ranges are "
+    "valid, absolute levels are not. Stand still for 3 seconds next time."
 )
 
 FROM_PAUSES: Final = (
-    "The person only paused in mid-stride, so sensors were calibrated from walking: joint angles have "
-    "ranges, no levels. Stand still for 3 seconds with both feet side by side next time."
+    "The person only paused mid-stride, so the sensors were calibrated from walking: joint angle ranges "
+    "are valid, absolute levels are not. Stand still for 3 seconds with both feet side by side next time."
 )
 
 

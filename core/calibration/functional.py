@@ -195,16 +195,16 @@ def _tell(
     if done < asked:
         message = (
             Message(
-                f"{{segment}}: calibration saw {{done}} {plural(done, 'swing', 'swings')}, {{asked}} or "
-                "more are good.",
+                f"{{segment}}: calibration used {{done}} {plural(done, 'swing', 'swings')}; {{asked}} or "
+                "more are recommended.",
                 segment=segment,
                 done=done,
                 asked=asked,
             )
             if how == "hip_swing"
             else Message(
-                f"{{segment}}: calibration saw {{done}} {plural(done, 'bow', 'bows')}, {{asked}} or more "
-                "are good.",
+                f"{{segment}}: calibration used {{done}} {plural(done, 'bow', 'bows')}; {{asked}} or more "
+                "are recommended.",
                 segment=segment,
                 done=done,
                 asked=asked,
@@ -213,8 +213,8 @@ def _tell(
         told.append(Notice("few_repetitions", message, sensor=segment))
     if rho < GOOD_AXIS:
         message = Message(
-            "{segment}: in the {what} the first component holds {rho:.0%} of the movement, {GOOD_AXIS:.0%} "
-            "or more is good. Move in one plane.",
+            "{segment}: in the {what} the first principal component explains {rho:.0%} of the movement "
+            "(good: {GOOD_AXIS:.0%} or more). Move in one plane.",
             segment=segment,
             what=what,
             rho=rho,
@@ -223,8 +223,8 @@ def _tell(
         told.append(Notice("not_single_axis", message, sensor=segment))
     if margin < WEAK_MARGIN:
         message = Message(
-            "{segment}: forward and backward are hard to tell apart in these {what}; {further} "
-            "further forward than back, or declare the mounting.",
+            "{segment}: forward and backward are hard to distinguish in these {what}; {further} further "
+            "forward than back, or declare the placement.",
             segment=segment,
             what=what,
             further=further,

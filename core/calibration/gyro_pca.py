@@ -76,9 +76,9 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
         raise CalibrationError(
             "not_single_axis",
             Message(
-                "{segment}: the movement has no single axis, the first component holds {rho:.0%} of "
-                "it, at least {SINGLE_AXIS:.0%} is needed. Walk straight for at least 8 steps, or "
-                "calibrate by walking direction.",
+                "{segment}: the movement has no dominant axis: the first principal component explains "
+                "{rho:.0%} of it, at least {SINGLE_AXIS:.0%} is required. Walk straight for at least 8 "
+                "steps, or calibrate from the walking direction.",
                 segment=segment,
                 rho=rho,
                 SINGLE_AXIS=SINGLE_AXIS,

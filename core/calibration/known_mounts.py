@@ -73,7 +73,7 @@ def calibrate_with_mounts(
         raise CalibrationError(
             "no_segment",
             Message(
-                "Mountings are known of {mounts}; the take has {sensors}.",
+                "Placements are known for {mounts}; the trial has {sensors}.",
                 mounts=", ".join(mounts),
                 sensors=", ".join(recording.sensors),
             ),
@@ -81,7 +81,7 @@ def calibrate_with_mounts(
     found = find_rests(recording, params)
     rests = tuple((max(r[0], after_s), r[1]) for r in found if r[1] - params.shortest_s >= after_s)
     if not rests:
-        raise SignalError("no_rest", "No standing found with the sensors on.", t_s=after_s)
+        raise SignalError("no_rest", "No quiet standing detected with the sensors attached.", t_s=after_s)
     rest = next((r for r in rests if r[1] - r[0] >= GOOD_S), None) or max(rests, key=lambda r: r[1] - r[0])
     zero = (max(rest[0], rest[1] - LONGEST_S), rest[1])
     standing = stand_all(recording, zero, rests, params)
@@ -119,7 +119,9 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         if lean > OFF:
             raise _refuse(
                 segment,
-                Message("in standing its long axis is {lean:.0f}° off the vertical", lean=degrees(lean)),
+                Message(
+                    "its long axis is {lean:.0f}° off the vertical during quiet standing", lean=degrees(lean)
+                ),
             )
         if segment not in FORWARD:
             continue
@@ -134,19 +136,22 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         if turned > OFF:
             raise _refuse(
                 segment,
-                Message("it bends about an axis {turned:.0f}° off the agreed one", turned=degrees(turned)),
+                Message("its flexion axis is {turned:.0f}° off the specified one", turned=degrees(turned)),
             )
         low, high = np.percentile(FORWARD[segment] * np.arctan2(force[:, 0], force[:, 1]), (2.0, 98.0))
         stood = FORWARD[segment] * float(np.arctan2(up[0], up[1]))
         if stood - low > high - stood and stood - low > LEANS:
-            raise _refuse(segment, "in squats it leans the wrong way, so it sits the other way round")
+            raise _refuse(
+                segment, "it tilts in the wrong direction in squats, so it is attached the other way round"
+            )
 
 
 def _refuse(segment: Segment, what: str) -> CalibrationError:
     return CalibrationError(
         "mounting_not_as_agreed",
         Message(
-            "{segment}: {what}; limit {OFF:.0f}°. Put the sensor on as agreed, or calibrate from the table.",
+            "{segment}: {what}; limit {OFF:.0f}°. Attach the sensor as specified in the protocol, or "
+            "calibrate from the table.",
             segment=segment,
             what=what,
             OFF=degrees(OFF),

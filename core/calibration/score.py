@@ -247,19 +247,19 @@ class _Evidence:
     def check_steps(self) -> CalibrationCheck:
         steps = self.calibration.straight_steps
         if steps is None:
-            return self._leave("repetitions", None, "No leg sensor shows steps of a straight walk.")
+            return self._leave("repetitions", None, "No leg sensor shows steps of straight walking.")
         return self._judge("repetitions", None, float(steps))
 
     def check_stillness(self, segment: Segment) -> CalibrationCheck:
         if self.calibration.posture != "standing":
-            return self._leave("stillness", segment, "Nobody stood still; the walk alone had to do.")
+            return self._leave("stillness", segment, "No quiet standing; calibrated from walking alone.")
         part = index_window(self.calibration.zero, self.recording.rate_hz)
         turned, _ = measure_turn(self.recording.sensors[segment].cut("acc", part), self.recording.rate_hz)
         return self._judge("stillness", segment, degrees(turned))
 
     def check_gravity(self, segment: Segment) -> CalibrationCheck:
         if self.calibration.posture != "standing":
-            return self._leave("gravity", segment, "Nobody stood still; the walk alone had to do.")
+            return self._leave("gravity", segment, "No quiet standing; calibrated from walking alone.")
         norm = self.calibration.segments[segment].rest_norm
         return self._judge("gravity", segment, 100.0 * abs(norm / GRAVITY - 1.0))
 
@@ -267,41 +267,44 @@ class _Evidence:
         if self.calibration.segments[segment].method in FUNCTIONAL:
             return self._judge("axis_share", segment, float(self._facts(segment)["rho"]))
         if segment in TRUNK:
-            return self._leave("axis_share", segment, "A walking trunk turns about every axis.")
+            return self._leave("axis_share", segment, "The trunk rotates about all axes in walking.")
         found = self.axes[segment]
         if found is None:
-            return self._leave("axis_share", segment, "No straight walking shows it.")
+            return self._leave("axis_share", segment, "No straight walking available.")
         return self._judge("axis_share", segment, found[1])
 
     def check_mirror(self, segment: Segment) -> CalibrationCheck:
         pair = next((p for p in (THIGH, SHANK, FOOT) if segment in p.values()), None)
         if pair is None:
-            return self._leave("mirror", segment, "It has no counterpart on the other side.")
+            return self._leave("mirror", segment, "No sensor on the other side to compare with.")
         found = [self.axes.get(s) for s in pair.values()]
         known = [x for x in found if x is not None]
         if len(known) < len(found):
-            return self._leave("mirror", segment, "The other side has no calibrated sensor that walked.")
+            return self._leave("mirror", segment, "No calibrated sensor with walking data on the other side.")
         apart = degrees(abs(float(wrap_angle(known[0][0] + known[1][0]))))
         if min(share for _, share in known) < GOOD_AXIS:
-            return self._leave("mirror", segment, "Its main axis of turning is not clear enough.", apart)
+            return self._leave("mirror", segment, "Its main axis of rotation is not clear enough.", apart)
         return self._judge("mirror", segment, apart)
 
     def check_knee_axis(self, segment: Segment) -> CalibrationCheck:
         side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
         if side is None:
-            return self._leave("knee_axis", segment, "It is not beside a knee.")
+            return self._leave("knee_axis", segment, "Not adjacent to a knee.")
         found = self.knees.get(side)
         if found is None:
             return self._leave(
                 "knee_axis",
                 segment,
                 Message(
-                    "Thigh and shank were not both seen in {KNEE_SEEN:.0f} s of walking.", KNEE_SEEN=KNEE_SEEN
+                    "Thigh and shank were not both recorded for {KNEE_SEEN:.0f} s of walking.",
+                    KNEE_SEEN=KNEE_SEEN,
                 ),
             )
         apart = degrees(abs(float(wrap_angle(found.apart))))
         if found.steepest > STEEPEST:
-            return self._leave("knee_axis", segment, "Skin moves too much to see the knee's axis.", apart)
+            return self._leave(
+                "knee_axis", segment, "Soft-tissue motion is too large to determine the knee axis.", apart
+            )
         return self._judge("knee_axis", segment, apart)
 
     def check_joints(self, segment: Segment) -> CalibrationCheck:
@@ -311,7 +314,7 @@ class _Evidence:
         misfits = {} if self.agreed is None else self.agreed.misfits
         own = [x for joint, x in misfits.items() if segment in joint]
         if not own:
-            return self._leave("joint_misfit", segment, "No sensor across one of its joints walked with it.")
+            return self._leave("joint_misfit", segment, "No adjacent segment has a sensor with walking data.")
         return self._judge("joint_misfit", segment, min(own))
 
     def check_heading_spread(self, segment: Segment) -> CalibrationCheck:
@@ -331,5 +334,7 @@ class _Evidence:
             if v["source"] in OF_FORWARD and v["share"] >= HEARD
         ]
         if not measures:
-            return self._leave("heading_spread", segment, "Only one measure shows its way forward.")
+            return self._leave(
+                "heading_spread", segment, "Only one estimate of its forward direction is available."
+            )
         return self._judge("heading_spread", segment, degrees(max(map(abs, measures))))

@@ -127,8 +127,8 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         raise SignalError(
             "not_still",
             Message(
-                "No standing found: in the quietest seconds a sensor still turns by more than {drift:.0f}°. "
-                "Let the person stand still for 3 to 5 s before or after walking.",
+                "No quiet standing detected: even in the quietest seconds a sensor rotates by more than "
+                "{drift:.0f}°. Ask the person to stand still for 3 to 5 s before or after walking.",
                 drift=np.degrees(params.drift),
             ),
             t_s=found[0][0],
@@ -164,7 +164,8 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
     raise SignalError(
         code,
         Message(
-            "No standing found: {what}. Let the person stand still for 3 to 5 s before or after walking.",
+            "No quiet standing detected: {what}. Ask the person to stand still for 3 to 5 s before or "
+            "after walking.",
             what=what,
         ),
         sensor=segment if np.isfinite(rate) else None,

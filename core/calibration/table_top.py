@@ -87,7 +87,7 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
     """
     params = params or TableTopParams()
     if not recording.sensors:
-        raise CalibrationError("no_segment", "No sensor is mapped to a segment; map those on the table.")
+        raise CalibrationError("no_segment", "No sensor is assigned to a segment; assign those on the table.")
     mounts: dict[Segment, Floats] = {}
     biases: dict[Segment, Floats] = {}
     drifts: dict[Segment, float] = {}
@@ -103,8 +103,8 @@ def calibrate_table_top(recording: UniformRecording, params: TableTopParams | No
         mounts[segment], moved[segment] = to_matrix(multiply(to_segment, q)), body[0] - table[1]
         if drifts[segment] > params.drift:
             message = Message(
-                "{segment}: its tilt drifted by {degrees:.1f}° on the way from the table; its "
-                "heading may be off as much. Put it on again, faster.",
+                "{segment}: its inclination drifted by {degrees:.1f}° between the table and the body; its "
+                "heading may be off by as much. Repeat the transfer more quickly.",
                 segment=segment,
                 degrees=degrees(drifts[segment]),
             )
@@ -126,7 +126,7 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
     if not rests or rests[0][0] > params.edge_s:
         raise CalibrationError(
             "table_not_still",
-            "The sensors do not lie still together when the take begins; start it before touching them.",
+            "The sensors are not all still when the trial starts; start the recording before touching them.",
             t_s=0.0,
         )
     for rest in rests[1:]:
@@ -137,8 +137,8 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
     raise CalibrationError(
         "body_not_still",
         Message(
-            "No standing of {stand_s:g} s was found with all sensors on the body; stand still "
-            "before squatting.",
+            "No quiet standing of {stand_s:g} s detected with all sensors attached; stand still before "
+            "squatting.",
             stand_s=params.stand_s,
         ),
         t_s=rests[0][1],
@@ -178,8 +178,8 @@ def _find_ends(
         raise CalibrationError(
             "table_not_still",
             Message(
-                "{segment} does not lie still when the take begins; leave it on the table for {shortest_s:g} "
-                "s or more after the start.",
+                "{segment} is not still when the trial starts; leave it on the table for at least "
+                "{shortest_s:g} s after the start.",
                 segment=segment,
                 shortest_s=params.rest.shortest_s,
             ),
@@ -190,8 +190,8 @@ def _find_ends(
         raise CalibrationError(
             "body_not_still",
             Message(
-                "{segment} is not still on the body when the take ends; stand still for {shortest_s:g} "
-                "s or more before stopping.",
+                "{segment} is not still on the body when the trial ends; stand still for at least "
+                "{shortest_s:g} s before stopping.",
                 segment=segment,
                 shortest_s=params.rest.shortest_s,
             ),
@@ -203,8 +203,8 @@ def _find_ends(
         raise CalibrationError(
             "table_top_too_long",
             Message(
-                "{segment} was on its way for {table:.0f} s; the gyroscope can be trusted for {longest_s:g} "
-                "s.",
+                "Transferring {segment} from the table took {table:.0f} s; the gyroscope is accurate enough "
+                "for {longest_s:g} s.",
                 segment=segment,
                 table=body[0] - table[1],
                 longest_s=params.longest_s,
@@ -217,8 +217,8 @@ def _find_ends(
         raise CalibrationError(
             "table_not_still",
             Message(
-                "{segment} is not still on the table: its rate varies by {rate:.1f} °/s, limit {still:.0f} "
-                "°/s. Leave it alone for {still_s:g} s after the start.",
+                "{segment} is not still on the table: its angular rate varies by {rate:.1f} °/s (limit "
+                "{still:.0f} °/s). Do not touch it for {still_s:g} s after the start.",
                 segment=segment,
                 rate=degrees(rate),
                 still=degrees(params.still),
@@ -232,7 +232,7 @@ def _find_ends(
         raise CalibrationError(
             "table_top_gap",
             Message(
-                "{segment} sent nothing for a while on its way; how it turned meanwhile is not known.",
+                "{segment} lost data during the transfer from the table, so its rotation is unknown.",
                 segment=segment,
             ),
             sensor=segment,
@@ -266,8 +266,8 @@ def _lie_on_table(segment: Segment, force: Floats, params: TableTopParams) -> Fl
         raise CalibrationError(
             "table_orientation",
             Message(
-                "{segment} lies {slope:.0f}° off the agreed way on the table, limit {slope2:.0f}°; "
-                "lay all sensors the same way up.",
+                "{segment} lies {slope:.0f}° off the specified orientation on the table (limit "
+                "{slope2:.0f}°); lay all sensors the same way up.",
                 segment=segment,
                 slope=degrees(slope),
                 slope2=degrees(params.slope),

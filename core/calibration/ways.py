@@ -180,9 +180,9 @@ def tell_disagreement(segment: Segment, off: float) -> Notice:
     return Notice(
         "heading_disagreement",
         Message(
-            "{segment}: strides and acceleration show ways {abs:.0f}° apart, {DISAGREEMENT:.0f}° "
-            "are expected at most; the strides were used. Frontal and transverse angles of this "
-            "segment are doubtful; look at the mounting.",
+            "{segment}: the forward directions from strides and from acceleration differ by {abs:.0f}° "
+            "(expected up to {DISAGREEMENT:.0f}°); strides were used. Frontal and transverse angles of "
+            "this segment are unreliable; check its alignment.",
             segment=segment,
             abs=abs(degrees(off)),
             DISAGREEMENT=degrees(DISAGREEMENT),

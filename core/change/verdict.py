@@ -32,7 +32,7 @@ from sagittal.core.parameters.variability import TOO_FEW, has_enough_values
 
 Verdict = Literal["within_measurement_error", "real_change", "clinically_relevant"]
 
-STRIDES: Final = "strides and measurement of the two sessions, 95 %"
+STRIDES: Final = "strides and measurement of the two visits, 95 %"
 """Source of a limit that comes from the spread of the strides alone."""
 
 UNLIKE: Final = "conditions_differ"
@@ -173,7 +173,7 @@ def _parameter(
     mdc = find_detectable_change(new.name, old.mean, limb) if own is None else own.limit
     open_by_strides = _strides(old, new)
     if mdc is not None and open_by_strides > mdc.value:
-        mdc = ChangeLimit(open_by_strides, "these sessions", STRIDES)
+        mdc = ChangeLimit(open_by_strides, "these visits", STRIDES)
     was, now = (place_value(p.mean, norm).z for p, norm in zip((old, new), norms, strict=True))
     if was is not None and now is not None and abs(was) != abs(now):
         change = replace(change, towards_norm=abs(now) < abs(was))

@@ -73,8 +73,8 @@ def _find_stride_time(strides: Strides, side: Side) -> float | None:
 
 
 _WITHHELD: Final = (
-    "What is measured between the feet is withheld. Correct the contacts in the timeline, or check the "
-    "sensors of both feet and their clocks."
+    "Parameters that combine both feet are not reported. Correct the contacts in the timeline, or check "
+    "the sensors on both feet and their clocks."
 )
 
 
@@ -82,8 +82,8 @@ def _tell_counts(counts: dict[Side, int]) -> Notice:
     fewer: Side = "left" if counts["left"] < counts["right"] else "right"
     return Notice(
         CONTRADICTED,
-        f"Contacts while walking: left foot {counts['left']}, right foot {counts['right']}. "
-        f"Both feet make the same strides, so contacts are missing or were found twice. {_WITHHELD}",
+        f"Contacts while walking: left foot {counts['left']}, right foot {counts['right']}. Both feet "
+        f"take the same number of strides, so contacts were missed or detected twice. {_WITHHELD}",
         FOOT[fewer],
     )
 
@@ -91,6 +91,6 @@ def _tell_counts(counts: dict[Side, int]) -> Notice:
 def _tell_times(left: float, right: float) -> Notice:
     return Notice(
         CONTRADICTED,
-        f"A stride of the left foot takes {left:.2f} s, one of the right foot {right:.2f} s. Both feet make "
-        f"the same strides, so the contacts of one foot are wrong, or its clock is. {_WITHHELD}",
+        f"Stride time is {left:.2f} s on the left and {right:.2f} s on the right. It must be equal on "
+        f"average, so the contacts or the clock of one foot are wrong. {_WITHHELD}",
     )

@@ -67,9 +67,9 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
             Notice(
                 "feet_out_of_time",
                 Message(
-                    "The two double supports differ by {abs:.0f} ms. A limp looks like this, so does a "
-                    "clock {abs2:.0f} ms late. No sensor between the feet tells which: the ± of step "
-                    "times allows for it.",
+                    "The two double-support phases differ by {abs:.0f} ms. The cause may be a limp or a "
+                    "clock that is {abs2:.0f} ms late. No sensor between the feet can tell them apart: "
+                    "the ± of step times allows for both.",
                     abs=2000 * abs(lag),
                     abs2=1000 * abs(lag),
                 ),
@@ -81,10 +81,10 @@ def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice
         Notice(
             "feet_out_of_time",
             Message(
-                "The two double supports differ by {abs:.0f} ms: the "
-                f"{'right' if lag > 0 else 'left'} foot seems {{abs2:.0f}} ms late. A wrong clock "
-                "looks like this, a strong limp rarely. Step times and double support are doubtful; "
-                "synchronise the sensors.",
+                "The two double-support phases differ by {abs:.0f} ms: the "
+                f"{'right' if lag > 0 else 'left'} foot appears to be {{abs2:.0f}} ms late. This "
+                "indicates a clock offset, rarely a severe limp. Step times and double support are "
+                "unreliable; synchronise the sensors.",
                 abs=2000 * abs(lag),
                 abs2=1000 * abs(lag),
             ),

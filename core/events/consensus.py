@@ -260,9 +260,8 @@ def _others(side: Side, voters: Mapping[str, _Sorted]) -> Notice:
     return Notice(
         "others_found_contacts",
         Message(
-            "Other detectors found contacts of the {side} foot ({counts}). The analysis can be "
-            "run with the consensus of all detectors instead; compare its contacts with the "
-            "signals.",
+            "Other detectors found contacts of the {side} foot ({counts}). The analysis can be run with "
+            "the consensus of all detectors instead; check its contacts against the signals.",
             side=side,
             counts=counts,
         ),
@@ -275,11 +274,11 @@ def _led_by_other(side: Side, leads: str, voters: Mapping[str, _Sorted]) -> Noti
     return Notice(
         "led_by_other",
         Message(
-            "No contacts of the {side} foot were found by a foot sensor. These are of {leads} "
+            "No contacts of the {side} foot were detected from a foot sensor. They come from {leads} "
             + ("and {others} more" if len(voters) > 1 else "alone")
-            + " (reconstructions of published ones), about 0.06 s from what a foot sensor would "
-            "tell. Compare them with the signals, and stance, swing and support only with takes of "
-            "the same sensors.",
+            + " (reconstructions of published detectors), about 0.06 s from those of a foot sensor. "
+            "Check them against the signals, and compare stance, swing and support only with trials "
+            "using the same sensors.",
             side=side,
             leads=leads,
             others=len(voters) - 1,
@@ -294,15 +293,15 @@ def _disagree(side: Side, dropped: int, n: int) -> Notice:
         plural(
             dropped,
             Message(
-                "{dropped} possible contact of the {side} foot was seen by too few of {value} "
-                "detectors and is left out.",
+                "{dropped} possible contact of the {side} foot was detected by too few of {value} detectors "
+                "and is excluded.",
                 dropped=dropped,
                 side=side,
                 value=n,
             ),
             Message(
-                "{dropped} possible contacts of the {side} foot were seen by too few of {value} "
-                "detectors and are left out.",
+                "{dropped} possible contacts of the {side} foot were detected by too few of {value} "
+                "detectors and are excluded.",
                 dropped=dropped,
                 side=side,
                 value=n,

@@ -289,9 +289,10 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
             Notice(
                 "no_toe_off",
                 Message(
-                    "The {side} foot never pitched below {threshold} (lowest was {s_min}), so no "
-                    "contacts were found on it. A shuffling gait, no walking, or a sensor on another "
-                    "segment looks like this.",
+                    "The pitch of the {side} foot never fell below {threshold} (lowest: {s_min}), so "
+                    "no contacts "
+                    "were detected. Possible causes: shuffling gait, no walking, or a sensor on "
+                    "another segment.",
                     side=side,
                     threshold=_degrees(params.threshold),
                     s_min=_degrees(figures.s_min),
@@ -304,8 +305,8 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
             Notice(
                 "rest_pose_suspect",
                 Message(
-                    "The {side} foot never pitched above {suspect_max} (highest was {s_max}). Check "
-                    "that the person stood with the whole sole on the floor during the rest.",
+                    "The pitch of the {side} foot never exceeded {suspect_max} (highest: {s_max}). "
+                    "Check that the person stood with the whole sole on the floor.",
                     side=side,
                     suspect_max=_degrees(params.suspect_max),
                     s_max=_degrees(figures.s_max),
@@ -318,9 +319,8 @@ def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_w
             Notice(
                 "rest_pose_suspect",
                 Message(
-                    "The {side} foot is pitched by {s_quiet} on average while it is quiet (expected "
-                    "within ±{suspect_quiet}). Check that the person stood with the whole sole on the "
-                    "floor during the rest.",
+                    "The mean pitch of the {side} foot at rest is {s_quiet} (expected within "
+                    "±{suspect_quiet}). Check that the person stood with the whole sole on the floor.",
                     side=side,
                     s_quiet=_degrees(figures.s_quiet),
                     suspect_quiet=_degrees(params.suspect_quiet),
@@ -344,9 +344,9 @@ def _threshold_notice(figures: dict[str, PitchFigures], params: FootPitchParams)
     return Notice(
         "event_threshold_changed",
         Message(
-            "Contacts were found with a push-off threshold of {threshold:g} instead of {threshold2:g}: "
-            "{counts}. Compare the feet: a higher threshold can lose most contacts of a drop "
-            "foot.",
+            "Contacts were detected with a push-off threshold of {threshold:g} instead of "
+            "{threshold2:g}: {counts}. Compare both feet: a higher threshold can miss most contacts of a "
+            "drop foot.",
             threshold=params.threshold,
             threshold2=FootPitchParams.threshold,
             counts=counts,

@@ -139,7 +139,7 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
         segment = LIMB[params.segment][side]
         if segment not in take.q or not take.valid[segment].any():
             message = Message(
-                "No sensor on the {side} {segment}: {name} finds no contacts of it.",
+                "No sensor on the {side} {segment}: {name} cannot detect its contacts.",
                 side=side,
                 segment=params.segment,
                 name=params.name,

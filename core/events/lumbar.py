@@ -123,7 +123,7 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     params = params or LumbarParams()
     segment = trunk_sensor(recording)
     if segment is None:
-        raise SignalError("no_trunk_sensor", "Steps of the trunk need a sensor on the pelvis or the chest.")
+        raise SignalError("no_trunk_sensor", "Trunk steps require a sensor on the pelvis or chest.")
     found = _find_rows(recording, segment, params)
     if isinstance(found, Steps):
         return found
@@ -141,8 +141,8 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
             segment,
             "few_steps",
             Message(
-                f"{{times}} {plural(len(times), 'step was', 'steps were')} found, nowhere {{min_strides}} "
-                "without a break: no walking bout is reported. Record a longer walk.",
+                f"{{times}} {plural(len(times), 'step', 'steps')} detected, but never {{min_strides}} "
+                "in a row: no walking bout is reported. Record a longer walk.",
                 times=len(times),
                 min_strides=params.bouts.min_strides + 2,
             ),
@@ -173,9 +173,9 @@ def _tell_unknown_sides(steps: list[Step], segment: Segment) -> tuple[Notice, ..
     return (
         Notice(
             "side_unknown",
-            "Which foot made a step cannot be told"
-            + (" from the chest." if segment == "chest" else " everywhere from this sensor.")
-            + " Step times and cadence do not depend on it.",
+            "Left and right steps cannot "
+            + ("be distinguished from the chest." if segment == "chest" else "always be distinguished.")
+            + " Step times and cadence do not depend on this.",
             segment,
             severity="info",
         ),
@@ -218,7 +218,7 @@ def _find_rows(
     vertical, yaw_rate = _split_along(signals, up, norm)
     moving = find_moving(vertical, signals.valid, rate, params)
     if not moving.any():
-        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps were found.")
+        return _nothing(segment, "no_walking", "The trunk hardly moved: no steps detected.")
     if signals.gyr.any():
         rhythm = step_times(vertical, signals.gyr, rate, params.periodicity)
     else:
@@ -229,9 +229,8 @@ def _find_rows(
             segment,
             "non_periodic",
             Message(
-                "The movement of the trunk has no rhythm of steps (best score {max:.2f}; needed for "
-                "several seconds: {row_score:g}): no steps are reported. Record at least ten steps "
-                "straight ahead.",
+                "Trunk movement has no step rhythm (best score {max:.2f}; {row_score:g} required for several "
+                "seconds): no steps are reported. Record at least ten steps straight ahead.",
                 max=rhythm.score.max(),
                 row_score=params.periodicity.row_score,
             ),

@@ -148,15 +148,15 @@ def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
         word = plural(sum(left[s] for s in few), "stride counts", "strides count")
         said.append(
             Message(
-                "Only {counts} {word}; fewer than {COMPARED} of a side are compared with nothing. "
-                "Walk further straight ahead.",
+                "Only {counts} {word}; at least {COMPARED} per side are needed for a comparison. Walk "
+                "further straight ahead.",
                 counts=counts,
                 word=word,
                 COMPARED=COMPARED,
             )
         )
     if near_turns:
-        said.append("So few are left that strides next to a turn are counted too.")
+        said.append("Because so few remain, strides next to a turn are included.")
     return [Notice("short_walk", join_messages(*said))] if said else []
 
 
@@ -171,14 +171,14 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
             said = plural(
                 len(own),
                 Message(
-                    "The only {side} stride does not count: {words}. How a walk starts, turns and stops "
-                    "is left out: walk further straight ahead.",
+                    "The only {side} stride is excluded: {words}. Gait initiation, turns and termination are "
+                    "excluded: walk further straight ahead.",
                     side=side,
                     words=words,
                 ),
                 Message(
-                    "None of the {own} {side} strides counts: {words}. How a walk starts, turns and "
-                    "stops is left out: walk further straight ahead.",
+                    "All {own} {side} strides are excluded: {words}. Gait initiation, turns and "
+                    "termination are excluded: walk further straight ahead.",
                     own=len(own),
                     side=side,
                     words=words,

@@ -136,11 +136,12 @@ def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, 
         if analysis.legs is not None:
             raise EstimationError(
                 "no_orientations",
-                "Squats are followed by the chain of the leg; filters are compared on walks.",
+                "Squats are analysed with a kinematic chain of the leg; filters can be compared on walks "
+                "only.",
             )
         why = "" if analysis.problem is None else f" {analysis.problem.message}"
         raise EstimationError(
-            "nothing_calibrated", Message("No sensor of this take is calibrated.{why}", why=why)
+            "nothing_calibrated", Message("No sensor in this trial is calibrated.{why}", why=why)
         )
     return calibrated, alone, own
 
@@ -149,7 +150,7 @@ def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
     if not any(run.q for run in runs.values()):
         told = next(run.told[0].message for run in runs.values())
         raise EstimationError(
-            "no_filter_ran", Message("No filter gave a result. The first says: {told}", told=told)
+            "no_filter_ran", Message("No filter gave a result. The first reported: {told}", told=told)
         )
 
 
@@ -204,7 +205,7 @@ def _agree(
     to_median = pool_scores(list(by_median.values()))
     if name is not None and to_median is not None and to_median.total > FAR:
         message = Message(
-            "{total:.0f}° from the median: far from the others. Leave it out to see the spread of the rest.",
+            "{total:.0f}° from the median: far from the others. Exclude it to see the spread of the rest.",
             total=np.degrees(to_median.total),
         )
         told = (*told, Notice(FAR_CODE, message))
@@ -222,13 +223,14 @@ def _tell(agreements: list[FilterAgreement]) -> tuple[Notice, ...]:
         told.append(
             Notice(
                 "filters_left_out",
-                Message("No result, the table says why: {missing}.", missing=", ".join(missing)),
+                Message("No result (see the table for reasons): {missing}.", missing=", ".join(missing)),
             )
         )
     if far:
         told.append(
             Notice(
-                "filters_far", Message("Far from the others, and in the spread: {far}.", far=", ".join(far))
+                "filters_far",
+                Message("Far from the others but included in the spread: {far}.", far=", ".join(far)),
             )
         )
     return tuple(told)

@@ -143,9 +143,10 @@ def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
         ),
         Notice(
             "reference_turned",
-            "By segment, one constant turn of the world and one of the sensor were fitted to the median of "
-            "the filters. A constant error that all filters share does not show. Filters near the median "
-            "look better: errors that differ by less than about a degree rank no filter.",
+            "For each segment, one constant rotation of the world frame and one of the sensor frame were "
+            "fitted to the median of the filters. A constant error common to all filters is not visible. "
+            "Filters near the median appear better: differences below about one degree do not rank "
+            "filters.",
             severity="info",
         ),
     )
@@ -236,7 +237,8 @@ def _too_short(source: str) -> FormatError:
     return FormatError(
         "no_overlap",
         Message(
-            "“{source}” and the take have less than {LEAST_OVERLAP_S:g} s in common; give the whole of it.",
+            "“{source}” and the trial overlap by less than {LEAST_OVERLAP_S:g} s; provide the complete "
+            "reference.",
             source=source,
             LEAST_OVERLAP_S=LEAST_OVERLAP_S,
         ),

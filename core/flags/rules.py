@@ -63,7 +63,7 @@ Patterson et al. 2008."""
 _STIFF: Final = "cluster analysis of 50 people after stroke, 24 with a stiff knee, at their own speed"
 """Its abstract was read, which names no authors."""
 
-_PRACTICE: Final = "clinical use; no source confirmed"
+_PRACTICE: Final = "clinical use; no confirmed source"
 _CONTROLS: Final = "mean ± 2 SD of own controls"
 _RATIO: Final = "Patterson et al. 2010, 95 % of healthy people; source not confirmed"
 _OVERALL: Final = "Patterson et al. 2008 (Arch Phys Med Rehabil 89:304): 0.9 to 1.1 in 24 healthy people"

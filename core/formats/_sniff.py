@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from itertools import pairwise
 from typing import Final, Literal
 
 from sagittal.core.formats import live_reader, parquet, text
 from sagittal.core.formats.manifest import is_manifest
+from sagittal.core.formats.tables.layout import LINES, find_layout
 from sagittal.core.formats.vendors import mapping_xml
 from sagittal.core.formats.vendors.registry import find_vendor
 
@@ -18,6 +18,7 @@ nor manifest."""
 _MAGIC: Final = {
     b"\x89HDF": "HDF5 that is not APDM's (MATLAB 7.3, …)",
     b"MATLAB": "MATLAB",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook (.xls)",
     b"XTF\x00": "Xsens MTB",
     b"\xfa\xff": "Xsens MTB",
 }
@@ -26,6 +27,7 @@ _TEXT: Final = {
     b"inDegrees=": "OpenSim MOT",
 }
 _ADVICE: Final = {
+    "an old Excel workbook (.xls)": "save it as .xlsx or CSV.",
     "OpenSim STO": "orientations alone are no measurement. Upload the sensors' files; "
     "compare orientations on the tab Algorithms of an analysed session.",
     "OpenSim MOT": "joint angles alone are no measurement. Upload the sensors' files.",
@@ -84,21 +86,5 @@ def _sniff_json(data: bytes) -> tuple[Kind, str]:
 
 
 def _is_table(data: bytes) -> bool:
-    """Whether there are two adjacent rows with the same number of at least four numeric cells."""
-    rows = [r for r in text.head_lines(data, 30) if r.strip()]
-    for a, b in pairwise(rows):
-        for separator in text.SEPARATORS:
-            if _numbers(a, separator) >= 4 and _numbers(a, separator) == _numbers(b, separator):
-                return True
-    return False
-
-
-def _numbers(line: bytes, separator: bytes) -> int:
-    n = 0
-    for cell in line.split(separator):
-        try:
-            float(cell.replace(b",", b"."))
-        except ValueError:
-            continue
-        n += 1
-    return n
+    """Tell a table by two neighbouring rows of as many numbers."""
+    return find_layout(text.head_lines(data, LINES)) is not None

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 from pathlib import PurePosixPath
 from typing import Final
 
-from sagittal.core.errors import ArchiveError
+from sagittal.core.errors import ArchiveError, FormatError
 from sagittal.core.formats.source import SourceFile
+from sagittal.core.formats.tables.workbook import is_workbook, read_sheets
 
 ZIP_MAGIC = (b"PK\x03\x04", b"PK\x05\x06", b"PK\x07\x08")
 GZIP_MAGIC = b"\x1f\x8b"
@@ -44,6 +45,7 @@ EPISODE_MANIFEST: Final = "sagittal-manifest.json"
 archive that was analysed and archived again has that of every generation, the newest first."""
 EPISODE_CONFIG: Final = "config.json"
 _MOST_CONFIG: Final = 1_000_000
+_SPREADSHEET: Final = {"mimetype", "content.xml", "META-INF/manifest.xml"}
 _RATIO_FLOOR = 1 << 20
 """Below 1 MB no ratio is alarming: a file of a few blank lines packs 200 to 1."""
 
@@ -78,9 +80,14 @@ def is_gzip(head: bytes | bytearray) -> bool:
 def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> list[SourceFile]:
     """Replace every zip by its members and every gzip by its content; other files are passed through unread.
 
+    A workbook is replaced by its sheets as text.
+
     Raises
     ------
-    ArchiveError zip_bomb, zip_traversal, zip_link, zip_nested, zip_encrypted, zip_bad.
+    ArchiveError
+        zip_bomb, zip_traversal, zip_link, zip_nested, zip_encrypted, zip_bad.
+    FormatError
+        reader_missing, bad_workbook.
     """
     limits = limits or ArchiveLimits()
     out: list[SourceFile] = []
@@ -102,6 +109,10 @@ def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> 
             taken.add(name)
             out.append(m if name == m.name else SourceFile(name, m.size, m.read, m.opener))
     return out
+
+
+def _is_workbook_name(name: str) -> bool:
+    return name.lower().endswith((".xlsx", ".xlsm")) and not PurePosixPath(name).name.startswith(("~$", "._"))
 
 
 def _looks_packed(file: SourceFile) -> bool:
@@ -135,7 +146,19 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
         for info in infos
         if not info.is_dir() and "__MACOSX" not in PurePosixPath(info.filename).parts
     ]
-    if EPISODE_MARK not in {f.name for f in found}:
+    names = {f.name for f in found}
+    if is_workbook(names):
+        return read_sheets(name, data)
+    if names >= _SPREADSHEET:
+        raise FormatError(
+            "unsupported_format", f"{name} is an OpenDocument spreadsheet; save it as .xlsx or CSV."
+        )
+    found = [
+        inner
+        for f in found
+        for inner in (_members(f.name, f.read(), limits) if _is_workbook_name(f.name) else [f])
+    ]
+    if EPISODE_MARK not in names:
         return found
     told = [f for f in found if f.name == EPISODE_MANIFEST]
     return told + [
@@ -224,7 +247,7 @@ class _MemberReader:
             raise ArchiveError("zip_bad", f"{where} is damaged ({e}); zip the files again.") from e
         if len(out) != self.info.file_size:
             raise ArchiveError("zip_bad", f"{where} ends early; zip the files again.")
-        if is_zip(out[:4]) or is_gzip(out[:2]):
+        if (is_zip(out[:4]) and not _is_workbook_name(self.info.filename)) or is_gzip(out[:2]):
             raise ArchiveError(
                 "zip_nested", f"{where} is an archive itself; put the recordings directly into one zip."
             )

@@ -86,6 +86,7 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
     return BidsTable(
         SourceSpec(
             file=name,
+            skip_rows=0,
             header_rows=0,
             separator="\t",
             rate_hz=_rate(sidecar, rows, name),

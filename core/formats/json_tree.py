@@ -172,6 +172,15 @@ class JsonNode:
             raise self._wrong(key, "a number")
         return float(value)
 
+    def has(self, key: str) -> bool:
+        """Whether a key is there with a value."""
+        return self.value.get(key) is not None
+
+    def is_number(self, key: str) -> bool:
+        """Whether the value of a key is a number."""
+        value = self.value.get(key)
+        return isinstance(value, int | float) and not isinstance(value, bool)
+
     def count(self, key: str, default: int, most: int) -> int:
         """Whole number from 0 to `most`."""
         value = self.value.get(key, default)

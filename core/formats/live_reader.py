@@ -5,11 +5,12 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 
 from sagittal.core.errors import FormatError, InputError, Notice
-from sagittal.core.formats.draft import MOST_OUT_OF_ORDER, grade_loss, signal_digest
+from sagittal.core.formats.draft import grade_loss, signal_digest
 from sagittal.core.formats.live_clock import LiveClock, Micros, sample_times_us
 from sagittal.core.formats.live_log import (
     FILE_MARK,
@@ -30,6 +31,9 @@ from sagittal.core.formats.live_log import (
 from sagittal.core.frames import Floats
 from sagittal.core.plurals import plural
 from sagittal.core.signals.recording import ImuStream, Recording
+
+_MOST_OUT_OF_ORDER: Final = 0.01
+"""Share of samples that may run backwards before the stream is not to be trusted [our choice]."""
 
 
 def looks_like(data: bytes) -> bool:
@@ -212,7 +216,7 @@ def _in_order(
     lost = int(np.count_nonzero(~rising))
     if not lost:
         return t_us, samples, []
-    severity = grade_loss(lost, len(t_us)) if lost <= MOST_OUT_OF_ORDER * len(t_us) else "error"
+    severity = grade_loss(lost, len(t_us)) if lost <= _MOST_OUT_OF_ORDER * len(t_us) else "error"
     message = (
         f"{lost} of {len(t_us)} samples of stream {info.stream} "
         f"{plural(lost, 'repeats or runs', 'repeat or run')} backwards in time and "

@@ -16,6 +16,7 @@ import numpy as np
 from sagittal.core.errors import FormatError, Notice
 from sagittal.core.formats import text
 from sagittal.core.formats.source_spec import TIME_UNITS
+from sagittal.core.formats.tables import layout
 from sagittal.core.frames import Floats
 
 _STO_MARK: Final = b"endheader"
@@ -81,7 +82,7 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
     if not groups:
         raise FormatError("no_quaternions", f"{source} has no quaternions; found {_few(names)}. {HOW}")
     wanted = [times[0], *(column for columns in groups.values() for column in columns)]
-    comma = text.has_decimal_comma(bytes(body[:4096]).split(b"\n", 1)[0], separator)
+    comma = layout.has_decimal_comma(layout.first_rows(body), separator)
     table = text.read_columns(body, source, separator, names, wanted, decimal_comma=comma)
     found = _TIME.fullmatch(times[0])
     unit = TIME_UNITS[((found and found[1]) or "s").lower()]
@@ -115,7 +116,7 @@ def _open_sto(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
 def _open_csv(data: bytes, head: list[bytes], source: str) -> tuple[list[str], memoryview, bytes]:
     """Column names and rows of a table; lines starting with # or // before its header are skipped."""
     first = next((i for i, line in enumerate(head) if line.strip() and not line.startswith((b"#", b"//"))), 0)
-    separator = text.guess_separator([line for line in head[first : first + 3] if line.strip()])
+    separator = layout.guess_separator([line for line in head[first : first + 3] if line.strip()])
     if separator is None:
         raise FormatError("bad_table", f"{source} is not a table with one header row. {HOW}")
     names = text.split(head[first], separator)

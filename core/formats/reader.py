@@ -12,7 +12,8 @@ from sagittal.core.errors import ArchiveError, FormatError, InputError, Manifest
 from sagittal.core.formats import _sniff, bids, live_reader, parquet, table, text
 from sagittal.core.formats.aliases import segment_named
 from sagittal.core.formats.archive import EPISODE_MANIFEST, ArchiveLimits, expand
-from sagittal.core.formats.draft import Draft, finish
+from sagittal.core.formats.common_time import finish
+from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.manifest import Manifest, parse_manifest
 from sagittal.core.formats.source import SourceFile, digest_file, sha256
 from sagittal.core.formats.source_spec import SourceSpec

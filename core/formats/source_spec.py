@@ -36,10 +36,11 @@ class Channels:
 
     Parameters
     ----------
-    acc, gyr, mag : three names each, x, y, z. quat : four names in the order the source declares.
+    acc, gyr, mag : three names each, x, y, z; a sensor's signals may be spread over several files.
+    quat : four names in the order the source declares.
     """
 
-    acc: tuple[str, ...]
+    acc: tuple[str, ...] | None = None
     gyr: tuple[str, ...] | None = None
     mag: tuple[str, ...] | None = None
     quat: tuple[str, ...] | None = None
@@ -66,23 +67,23 @@ class SourceSpec:
     Parameters
     ----------
     file : name or pattern with * and ?, compared with the whole path and with its last part.
-    skip_rows : lines before the header. header_rows : lines of the header.
-    index_column : the first column is an index, not a signal.
-    rate_hz : nominal sampling rate. time_column, time_unit : the time column; counter : the sample counter;
-        without either, time follows from the rate.
-    gravity_included : False if the device has already removed gravity (unusable, with a message).
+    skip_rows : lines before the header. header_rows : lines of the header; None = as found in the file.
+    index_column : the first column is no signal.
+    rate_hz : nominal sampling rate. time_column, time_unit : where the time is, and its unit or the length of
+        one tick in s, None = as found; counter : what counts the samples; without either the rate makes time.
+    gravity_included : False when the device has already removed gravity (not usable, said so).
     columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
     quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
     """
 
     file: str
-    skip_rows: int = 0
-    header_rows: int = 1
+    skip_rows: int | None = None
+    header_rows: int | None = None
     index_column: bool = False
     separator: str | None = None
     rate_hz: float | None = None
     time_column: str | None = None
-    time_unit: str = "s"
+    time_unit: str | float | None = None
     counter: Counter | None = None
     acc_unit: str | None = None
     gyr_unit: str | None = None
@@ -122,13 +123,13 @@ def read_source(node: JsonNode) -> SourceSpec:
     gravity = node.flag("gravity_included")
     return SourceSpec(
         file=node.string("file"),
-        skip_rows=node.count("skip_rows", 0, 1000),
-        header_rows=node.count("header_rows", 1, 10),
+        skip_rows=node.count("skip_rows", 0, 1000) if node.has("skip_rows") else None,
+        header_rows=node.count("header_rows", 1, 10) if node.has("header_rows") else None,
         index_column=node.flag("index_column") or False,
         separator=node.choice("separator", (",", ";", "\t", " ", "|"), "manifest_bad_value"),
         rate_hz=rate,
         time_column=node.text("time_column"),
-        time_unit=node.choice("time_unit", tuple(TIME_UNITS), "unknown_unit") or "s",
+        time_unit=_time_unit(node),
         counter=counter,
         acc_unit=node.choice("acc_unit", tuple(ACC_UNITS), "unknown_unit"),
         gyr_unit=node.choice("gyr_unit", tuple(GYR_UNITS), "unknown_unit"),
@@ -166,6 +167,19 @@ def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
     return Counter(inner.string("column"), wrap), rate if counted is None else counted
 
 
+def _time_unit(node: JsonNode) -> str | float | None:
+    """Name of the unit of time, or the length of one tick in s."""
+    if not node.is_number("time_unit"):
+        return node.choice("time_unit", tuple(TIME_UNITS), "unknown_unit")
+    tick = node.number("time_unit")
+    if tick is None or not 1e-9 <= tick <= 86_400.0:
+        raise ManifestError(
+            "manifest_bad_value",
+            f"{node.at('time_unit')} is {tick:g}; expected the length of one tick in s, 0.0001 for 0.1 ms.",
+        )
+    return tick
+
+
 def _rate(node: JsonNode) -> float | None:
     rate = node.number("rate_hz")
     if rate is not None and not 1.0 <= rate <= 10_000.0:
@@ -178,8 +192,9 @@ def _rate(node: JsonNode) -> float | None:
 def _channels(node: JsonNode) -> Channels:
     node.only("acc", "gyr", "mag", "quat")
     acc = node.names("acc", 3)
-    if acc is None:
+    gyr, mag, quat = node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4)
+    if acc is None and gyr is None and mag is None:
         raise ManifestError(
             "manifest_bad_value", f"{node.path}.acc is missing; name three columns (x, y, z)."
         )
-    return Channels(acc, node.names("gyr", 3), node.names("mag", 3), node.names("quat", 4))
+    return Channels(acc, gyr, mag, quat)

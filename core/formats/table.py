@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -16,10 +14,25 @@ from sagittal.core.formats import text
 from sagittal.core.formats.draft import Draft, make_draft
 from sagittal.core.formats.source import SourceFile
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, Channels, Counter, SourceSpec
+from sagittal.core.formats.tables.header import (
+    complete_names,
+    find_header,
+    join_titles,
+    list_asked,
+    list_wanted,
+)
+from sagittal.core.formats.tables.layout import (
+    LINES,
+    find_layout,
+    guess_separator,
+    has_decimal_comma,
+)
+from sagittal.core.formats.tables.time_unit import check_tick, find_tick
 from sagittal.core.frames import Floats
 from sagittal.core.signals.sample_blocks import LongStream, SampleBlock
 
-_ROWS_TO_LOOK_AT = 4
+_ROWS_OF_TICKS: Final = 1000
+"""Rows by which a column of whole numbers is recognised."""
 _CHUNK: Final = 1 << 23
 """Bytes of a long table that are read at a time."""
 
@@ -38,60 +51,71 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
     FormatError
         empty, bad_table.
     """
-    layout = _lay_out(data, source, spec)
-    body = text.after_lines(data, spec.skip_rows + spec.header_rows)
+    layout, spec = _lay_out(data, source, spec)
+    body = text.after_lines(data, layout.first_row)
     if layout.separator == b" ":
-        body = memoryview(squeeze_blanks(bytes(body)))
+        body = memoryview(text.squeeze_blanks(bytes(body)))
     table = _without_blank_end(layout.read(body, source), spec)
-    ticks, clock = _time(table, spec, source)
+    ticks, clock, tick = _time(table, spec, source)
     return [
-        _sensor(device, channels, table, spec, source, ticks, clock)
+        draft
         for device, channels in spec.columns.items()
+        for draft in _sensor(device, channels, table, spec, source, ticks, clock, tick)
     ]
 
 
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
     """Drop trailing rows without any sensor value, as in exports with a longer EMG recording."""
-    names = [name for channels in spec.columns.values() for _, name in _asked(channels)]
+    names = [name for channels in spec.columns.values() for _, name in list_asked(channels)]
     known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
     end = known[-1] + 1 if len(known) else None
-    return text.Columns({name: values[:end] for name, values in table.values.items()}, table.notices)
+    values = {name: values[:end] for name, values in table.values.items()}
+    return text.Columns(values, table.notices, table.times)
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Layout of one table. titles : of all columns. wanted : columns to read."""
+    """How the rows of one table are cut.
+
+    Parameters
+    ----------
+    first_row : lines before the rows. titles : of all columns. wanted : columns that are read. times : those
+        of them that may be texts.
+    """
 
     separator: bytes
+    first_row: int
     titles: list[str]
     wanted: list[str]
     comma: bool
+    times: tuple[str, ...]
 
     def read(self, body: memoryview, source: str) -> text.Columns:
         """Parse rows without header into columns."""
         return text.read_columns(
-            body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma
+            body, source, self.separator, self.titles, self.wanted, decimal_comma=self.comma, times=self.times
         )
 
 
-def _lay_out(data: bytes, source: str, spec: SourceSpec) -> _Layout:
-    """Layout from the head of a table; errors as in `read_table`."""
+def _lay_out(data: bytes, source: str, spec: SourceSpec) -> tuple[_Layout, SourceSpec]:
+    """What the head of a table says, and the entry with unique names; errors as in `read_table`."""
     _check(spec, source)
-    lines = text.head_lines(data, spec.skip_rows + spec.header_rows + _ROWS_TO_LOOK_AT)
-    header = lines[spec.skip_rows : spec.skip_rows + spec.header_rows]
-    rows = [r for r in lines[spec.skip_rows + spec.header_rows :] if r.strip()]
+    lines = text.head_lines(data, (spec.skip_rows or 0) + (spec.header_rows or 0) + LINES)
+    known = spec.separator.encode() if spec.separator else None
+    found = find_layout(lines, known)
+    skip, header = find_header(lines, spec, found, known)
+    rows = [r for r in lines[skip + header :] if r.strip()]
     if not rows:
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
-    chosen = (
-        spec.separator.encode() if spec.separator else text.guess_separator(rows[: max(1, len(rows) - 1)])
+    separator = (
+        known or (found.separator if found else guess_separator(rows[: max(1, len(rows) - 1)])) or b","
     )
-    separator = chosen or b","
-    if separator == b" ":
-        header, rows = [squeeze_blanks(h) for h in header], [squeeze_blanks(r) for r in rows]
-    titles = find_titles(header, rows[0], separator, spec)
-    return _Layout(
-        separator, titles, _wanted(spec, titles, source), text.has_decimal_comma(rows[0], separator)
-    )
+    titles = join_titles(lines[skip : skip + header], rows, separator, spec)
+    spec = complete_names(spec, titles)
+    wanted = list_wanted(spec, titles, source)
+    times = () if spec.time_column is None else (spec.time_column,)
+    comma = has_decimal_comma(rows, separator)
+    return _Layout(separator, skip + header, titles, wanted, comma, times), spec
 
 
 def estimate_rows(head: bytes, size: int) -> float:
@@ -114,16 +138,16 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
             f"{source} is too long to be timed by a counter; give time_column or rate_hz in the manifest.",
         )
     head, tail = _ends(file)
-    layout = _lay_out(head, source, spec)
-    scale = TIME_UNITS[spec.time_unit]
-    body = text.after_lines(head, spec.skip_rows + spec.header_rows)
+    layout, spec = _lay_out(head, source, spec)
+    body = text.after_lines(head, layout.first_row)
     first = layout.read(_whole_lines(body), source)
     last = layout.read(_whole_lines(tail), source)
     if spec.time_column is None:
         rate = spec.rate_hz or 0.0
         row = len(bytes(body)) / max(1, len(next(iter(first.values.values()))))
-        start, duration = 0.0, file.size / row / rate
+        start, duration, scale = 0.0, file.size / row / rate, 1.0
     else:
+        scale = _find_scale(first, spec, source)
         times, ends = first.values[spec.time_column] * scale, last.values[spec.time_column] * scale
         rate = spec.rate_hz or 1.0 / float(np.median(np.diff(times[np.isfinite(times)])))
         start, duration = float(times[0]), float(np.nanmax(ends) - times[0])
@@ -134,7 +158,7 @@ def open_long_table(file: SourceFile, spec: SourceSpec) -> dict[str, LongStream]
             rate_hz=rate,
             has_gyro=channels.gyr is not None,
             duration_s=duration,
-            open_blocks=partial(_read_blocks, file, spec, layout, channels, start, rate),
+            open_blocks=partial(_read_blocks, file, spec, layout, channels, start, rate, scale),
         )
         for device, channels in spec.columns.items()
     }
@@ -156,13 +180,19 @@ def _whole_lines(data: memoryview) -> memoryview:
 
 
 def _read_blocks(
-    file: SourceFile, spec: SourceSpec, layout: _Layout, channels: Channels, start: float, rate: float
+    file: SourceFile,
+    spec: SourceSpec,
+    layout: _Layout,
+    channels: Channels,
+    start: float,
+    rate: float,
+    scale: float,
 ) -> Iterator[SampleBlock]:
     """Iterate over the rows from the first one, in chunks of a few megabytes."""
     acc_unit, gyr_unit = ACC_UNITS[spec.acc_unit or "m/s2"], GYR_UNITS[spec.gyr_unit or "rad/s"]
     rows = 0
     with file.open() as opened:
-        for _ in range(spec.skip_rows + spec.header_rows):
+        for _ in range(layout.first_row):
             opened.readline()
         rest = b""
         while True:
@@ -171,24 +201,19 @@ def _read_blocks(
             end = len(body) if not data else body.rfind(b"\n") + 1
             body, rest = body[:end], body[end:]
             if body.strip():
-                part = memoryview(squeeze_blanks(body) if layout.separator == b" " else body)
+                part = memoryview(text.squeeze_blanks(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
-                acc = table.stack(channels.acc) * acc_unit
+                acc = table.stack(channels.acc or ()) * acc_unit
                 gyr = None if channels.gyr is None else table.stack(channels.gyr) * gyr_unit
                 if spec.time_column is None:
                     t_s = (rows + np.arange(len(acc))) / rate
                 else:
-                    t_s = table.values[spec.time_column] * TIME_UNITS[spec.time_unit] - start
+                    t_s = table.values[spec.time_column] * scale - start
                 rows += len(acc)
                 timed = np.isfinite(t_s)
                 yield SampleBlock(t_s[timed], acc[timed], None if gyr is None else gyr[timed])
             if not data:
                 return
-
-
-def squeeze_blanks(data: bytes) -> bytes:
-    """Collapse runs of spaces that align columns, and remove leading ones."""
-    return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 
 
 def _check(spec: SourceSpec, source: str) -> None:
@@ -197,7 +222,7 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError(
             "unknown_column", f"{where} names no columns; say which columns of {source} are which sensor."
         )
-    if spec.acc_unit is None:
+    if spec.acc_unit is None and any(c.acc for c in spec.columns.values()):
         raise ManifestError(
             "unit_missing", f"{where}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
         )
@@ -215,64 +240,35 @@ def _check(spec: SourceSpec, source: str) -> None:
         raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
 
-def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceSpec) -> list[str]:
-    """Column titles; several header rows are joined by "/", a table without a header is numbered 1, 2, 3 …"""
-    cells = row.count(separator) + 1
-    parts = [text.split(line, separator) for line in header]
-    parts = [[*p, *[""] * (cells - len(p))][:cells] if len(p) >= cells else p for p in parts]
-    if not parts:
-        return [str(i + 1) for i in range(cells)]
-    width = max(len(p) for p in parts)
-    names = ["/".join(p[i] for p in parts if i < len(p) and p[i]) for i in range(width)]
-    if spec.index_column and width == cells - 1:
-        names = ["", *names]
-    return [*names, *[""] * (cells - len(names))]
-
-
-def _wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
-    names = text.number_columns(titles)
-    there = names[1:] if spec.index_column else names
-    wanted: list[str] = []
-    asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in _asked(c)]
-    for path, clock in (("time_column", spec.time_column), ("counter.column", _counted(spec))):
-        if clock is not None:
-            asked.append((path, clock))
-            there = names
-    for path, name in asked:
-        if name not in names and name in titles:
-            raise ManifestError(
-                "ambiguous_column",
-                f"{path}: expected the name of one column, but {titles.count(name)} columns of {source} are "
-                f"called '{name}'. Give one of these names: {text.describe_columns(titles, name)}.",
-            )
-        if name not in there:
-            near = difflib.get_close_matches(name, there, 1, 0.4)
-            hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(there[:20])}."
-            raise ManifestError("unknown_column", f"{path}: {source} has no column '{name}'; {hint}")
-        if name not in wanted:
-            wanted.append(name)
-    return wanted
-
-
-def _asked(c: Channels) -> list[tuple[str, str]]:
-    groups = (("acc", c.acc), ("gyr", c.gyr), ("mag", c.mag), ("quat", c.quat))
-    return [(kind, name) for kind, group in groups for name in group or ()]
-
-
-def _counted(spec: SourceSpec) -> str | None:
-    return None if spec.counter is None else spec.counter.column
-
-
-def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str]:
-    """Ticks of every row and their kind (see `Draft`)."""
+def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str, float]:
+    """Ticks of every row, what they are, and the smallest unit of a clock in s (see `Draft`)."""
     if spec.counter is not None:
         counts = table.values[spec.counter.column]
         _check_counter(counts, spec.counter, source)
-        return counts, "counter"
+        return counts, "counter", 0.0
     if spec.time_column is None:
         n = len(next(iter(table.values.values())))
-        return np.arange(n, dtype=np.float64), "index"
-    return table.values[spec.time_column] * TIME_UNITS[spec.time_unit], "device"
+        return np.arange(n, dtype=np.float64), "index", 0.0
+    scale = _find_scale(table, spec, source)
+    values = table.values[spec.time_column]
+    known = values[np.isfinite(values)][:_ROWS_OF_TICKS]
+    whole = (
+        bool(len(known)) and spec.time_column not in table.times and bool((known == np.round(known)).all())
+    )
+    return values * scale, "device", scale if whole else 0.0
+
+
+def _find_scale(table: text.Columns, spec: SourceSpec, source: str) -> float:
+    """Length in s of the unit of the time column."""
+    if spec.time_column is None or spec.time_column in table.times:
+        return 1.0
+    values = table.values[spec.time_column]
+    if spec.time_unit is None:
+        return find_tick(spec.time_column, values, spec.rate_hz, source)
+    if isinstance(spec.time_unit, float):
+        return spec.time_unit
+    check_tick(spec.time_column, values, spec.time_unit, source)
+    return TIME_UNITS[spec.time_unit]
 
 
 def _check_counter(counts: Floats, counter: Counter, source: str) -> None:
@@ -302,10 +298,24 @@ def _sensor(
     source: str,
     ticks: Floats,
     clock: str,
-) -> Draft:
+    tick: float,
+) -> Iterator[Draft]:
+    """A sensor, or parts of it where the file holds no acceleration."""
     notices = list(table.notices)
-    acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
+    wrap = spec.counter.wrap if spec.counter else None
     gyr = None if channels.gyr is None else table.stack(channels.gyr) * GYR_UNITS[spec.gyr_unit or "rad/s"]
+    if channels.acc is None:
+        for part, values in (
+            ("gyr", gyr),
+            ("mag", None if channels.mag is None else table.stack(channels.mag)),
+        ):
+            if values is not None:
+                yield Draft(
+                    device, source, clock, ticks, values, None, None, None, spec.rate_hz, tuple(notices),
+                    wrap, tick=tick, part=part,
+                )  # fmt: skip
+        return
+    acc = table.stack(channels.acc) * ACC_UNITS[spec.acc_unit or "m/s2"]
     if not spec.gravity_included:
         notices.append(
             Notice(
@@ -320,8 +330,7 @@ def _sensor(
     if quat is not None and spec.quat_order == "xyzw":
         quat = quat[:, [3, 0, 1, 2]]
     mag = None if channels.mag is None else table.stack(channels.mag)
-    wrap = spec.counter.wrap if spec.counter else None
-    return make_draft(
+    yield make_draft(
         device, source, clock, ticks, acc=acc, gyr=gyr, mag=mag, quat=quat, rate_hz=spec.rate_hz,
-        notices=notices, wrap=wrap,
+        notices=notices, wrap=wrap, tick=tick,
     )  # fmt: skip

@@ -13,14 +13,16 @@ from typing import Any, Final
 
 import numpy as np
 
-from sagittal.core.errors import FormatError, ManifestError
+from sagittal.core.errors import FormatError, InputError, ManifestError
 from sagittal.core.formats import table, text
 from sagittal.core.formats._sniff import sniff
 from sagittal.core.formats.aliases import segment_in
-from sagittal.core.formats.archive import is_gzip, is_zip
+from sagittal.core.formats.archive import expand, is_gzip, is_zip
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source import SourceFile, stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.formats.tables.header import find_titles
+from sagittal.core.formats.tables.layout import LINES, find_layout
 from sagittal.core.frames import GRAVITY, Floats
 
 PIECE: Final = 1 << 21
@@ -29,9 +31,6 @@ SHOWN: Final = 6
 """Rows of a preview."""
 THE_FILE: Final = "*"
 """Name of a sensor whose columns name none: it is called as its file."""
-_MOST_HEADER: Final = 3
-_LINES: Final = 60
-_LEAST_CELLS: Final = 4
 _CELL: Final = 40
 """Characters of a cell that a preview shows."""
 
@@ -110,27 +109,24 @@ def look_into_table(file: SourceFile) -> TableLook | None:
 
     For a table without three columns of one acceleration `columns` is empty.
     """
-    with file.open() as opened:
-        raw = opened.read(PIECE)
-    if is_zip(raw) or is_gzip(raw):
+    data = _read_head(file)
+    if data is None or sniff(data)[0] != "table":
         return None
-    data = text.to_utf8(raw)
-    if sniff(data)[0] != "table":
-        return None
-    shape = _find_shape(data)
+    shape = find_layout(text.head_lines(data, LINES))
     if shape is None:
         return None
-    separator, skip, header, rows_from, index_column = shape
+    separator, skip, header, rows_from = shape.separator, shape.skip_rows, shape.header_rows, shape.first_row
+    index_column = shape.index_column
     lines = text.head_lines(data, rows_from + SHOWN + 1)
-    squeeze = table.squeeze_blanks if separator == b" " else bytes
+    squeeze = text.squeeze_blanks if separator == b" " else bytes
     spec = SourceSpec(file=file.name, skip_rows=skip, header_rows=header, index_column=index_column)
     first = squeeze(lines[rows_from])
-    titles = table.find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
+    titles = find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
     names = text.number_columns(titles)
     shown = [
         text.split(squeeze(line), separator) for line in lines[rows_from : rows_from + SHOWN] if line.strip()
     ]
-    values = _values(data, rows_from, separator, names, text.has_decimal_comma(first, separator))
+    values = _values(data, rows_from, separator, names, shape.decimal_comma)
     source: dict[str, Any] = {"skip_rows": skip, "header_rows": header, "separator": separator.decode()}
     if index_column:
         source["index_column"] = True
@@ -156,63 +152,25 @@ def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def read_sample(file: SourceFile, spec: SourceSpec) -> list[Draft]:
-    """Read the sensors at the beginning of a table; raises as `table.read_table`."""
-    with file.open() as opened:
-        data = text.to_utf8(opened.read(PIECE))
+    """The sensors of the beginning of a table; raises as `table.read_table`."""
+    data = _read_head(file) or b""
     end = data.rfind(b"\n") + 1
     return table.read_table(data[:end] if end and file.size > PIECE else data, file.name, spec)
 
 
-def _find_shape(data: bytes) -> tuple[bytes, int, int, int, bool] | None:
-    """Separator, lines before and in the header, first line of numbers, whether the first column is
-    unnamed.
-    """
-    lines = text.head_lines(data, _LINES)
-    best: tuple[int, bytes, int] | None = None
-    for separator in text.SEPARATORS:
-        cut = [
-            text.split(table.squeeze_blanks(line) if separator == b" " else line, separator) for line in lines
-        ]
-        for i in range(len(cut) - 1):
-            width = len(cut[i])
-            if (
-                width >= _LEAST_CELLS
-                and len(cut[i + 1]) == width
-                and _is_numbers(cut[i])
-                and _is_numbers(cut[i + 1])
-            ):
-                if best is None or width > best[0]:
-                    best = (width, separator, i)
-                break
-    if best is None:
+def _read_head(file: SourceFile) -> bytes | None:
+    """Beginning of a table as text, also of a workbook with one sheet; None of other packed files."""
+    with file.open() as opened:
+        raw = opened.read(PIECE)
+    if is_gzip(raw):
         return None
-    width, separator, first = best
-    header = 0
-    while header < min(_MOST_HEADER, first):
-        cells = text.split(
-            table.squeeze_blanks(lines[first - header - 1])
-            if separator == b" "
-            else lines[first - header - 1],
-            separator,
-        )
-        if len(cells) not in (width, width - 1) or _is_numbers(cells) or not any(cells):
-            break
-        header += 1
-    cells = text.split(lines[first - 1], separator) if header else []
-    return separator, first - header, header, first, bool(header) and len(cells) == width - 1
-
-
-def _is_numbers(cells: Sequence[str]) -> bool:
-    """Whether cells are mostly numbers, the rest blank or one text such as a date."""
-    numbers = sum(_number(c) is not None for c in cells)
-    return numbers >= _LEAST_CELLS and numbers + sum(c in text.MISSING for c in cells) >= len(cells) - 1
-
-
-def _number(cell: str) -> float | None:
-    try:
-        return float(cell.replace(",", "."))
-    except ValueError:
-        return None
+    if is_zip(raw):
+        try:
+            (sheet,) = expand([file])
+        except (InputError, ValueError):
+            return None
+        raw = sheet.read()[:PIECE] if sheet.name == file.name else b""
+    return text.to_utf8(raw)
 
 
 def _values(
@@ -223,9 +181,11 @@ def _values(
     end = bytes(body).rfind(b"\n") + 1
     rows = bytes(body[:end] if end else body)
     if separator == b" ":
-        rows = table.squeeze_blanks(rows)
+        rows = text.squeeze_blanks(rows)
     try:
-        return text.read_columns(memoryview(rows), "", separator, names, names, decimal_comma=comma).values
+        return text.read_columns(
+            memoryview(rows), "", separator, names, names, decimal_comma=comma, times=names
+        ).values
     except FormatError:
         return {}
 

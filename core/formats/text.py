@@ -10,13 +10,17 @@ from typing import Any, Final, Literal, cast
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute
 import pyarrow.csv as pc
 
 from sagittal.core.errors import FormatError, Notice
+from sagittal.core.formats.clocks.text_times import looks_like_time, parse_times
 from sagittal.core.formats.draft import grade_loss
 from sagittal.core.frames import Floats
 from sagittal.core.plurals import plural
 
+compute: Any = pyarrow.compute
+"""Its stubs know no overload for many of these calls."""
 SEPARATORS: Final = (b"\t", b";", b",", b"|", b" ")
 MISSING: Final = ["", "NaN", "nan", "NAN", "NA", "N/A", "n/a", "null", "NULL", "-", "None"]
 LARGEST: Final = 1e30
@@ -25,14 +29,17 @@ MOST_LISTED: Final = 20
 """Columns that a message lists."""
 _LONGEST_LINE: Final = 1_000_000
 _HEAD: Final = 1 << 16
+_FIRST_ROWS: Final = 20
+_NUMBER: Final = r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$"
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Columns by name; a missing or unreadable cell is NaN."""
+    """Columns by name; a missing or unreadable cell is NaN. `times` were dates or times of day, now s."""
 
     values: dict[str, Floats]
     notices: tuple[Notice, ...]
+    times: frozenset[str] = frozenset()
 
     def stack(self, names: Sequence[str]) -> Floats:
         """Columns as an array (n, len(names))."""
@@ -109,9 +116,9 @@ def fit_names(names: Sequence[str], body: memoryview, separator: bytes) -> list[
     return [*named, *[""] * (cells - len(named))]
 
 
-def has_decimal_comma(line: bytes, separator: bytes) -> bool:
-    """Whether numbers have a decimal comma: "0,074;9,922" rather than "0.074;9.922"."""
-    return separator != b"," and b"." not in line and re.search(rb"\d,\d", line) is not None
+def squeeze_blanks(data: bytes) -> bytes:
+    """Columns that were lined up with several spaces are one space apart, and none is before the first."""
+    return re.sub(rb"(?m)^ +| +(?=\r?$)", b"", re.sub(rb" +", b" ", data))
 
 
 def read_columns(
@@ -122,13 +129,15 @@ def read_columns(
     wanted: Sequence[str],
     *,
     decimal_comma: bool,
+    times: Sequence[str] = (),
 ) -> Columns:
     """Read the wanted columns of a table without its header.
 
     Parameters
     ----------
     body : rows, starting at a line start. names : titles of all columns in order. wanted : some of them, or
-        names from `number_columns`.
+        names that `number_columns` gives them. times : those of them that may hold dates or times of day as
+        text, which are read as seconds.
 
     Raises
     ------
@@ -139,32 +148,49 @@ def read_columns(
     _check_titles(titles, names, wanted, source)
     if not bytes(body[:_HEAD]).strip():
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
-    table = _Table(_as_utf8(body), separator, names, wanted, decimal_comma)
+    texts = [name for name in times if _holds_times(body, separator, list(names).index(name))]
+    table = _Table(_as_utf8(body), separator, names, wanted, decimal_comma, texts)
     values, rows, notices = _read_values(table, source)
     notices += _check_rows(rows, table.broken, len(names), source)
-    return Columns(values, tuple(notices))
+    return Columns(values, tuple(notices), frozenset(texts))
+
+
+def _holds_times(body: memoryview, separator: bytes, column: int) -> bool:
+    """Whether the first cells of a column are dates or times of day."""
+    rows = [split(line, separator) for line in head_lines(bytes(body[:_HEAD]), _FIRST_ROWS)]
+    found = [row[column] for row in rows if len(row) > column and row[column] not in MISSING]
+    return bool(found) and sum(looks_like_time(cell) for cell in found) > len(found) / 2
 
 
 @dataclass(frozen=True, eq=False)
 class _Table:
-    """A table without its header; `broken` is the number of cells in rows that were dropped."""
+    """A table without its header.
+
+    Parameters
+    ----------
+    texts : wanted columns of dates or times. broken : cells of each row of values that was left out, and
+        `others`, first cells of lines that hold no values.
+    """
 
     body: memoryview
     separator: bytes
     names: list[str]
     wanted: Sequence[str]
     decimal_comma: bool
+    texts: Sequence[str] = ()
     broken: list[int] = field(default_factory=list)
+    others: list[str] = field(default_factory=list)
 
     def read(self, kind: pa.DataType) -> pa.Table:
-        """The wanted columns, all of one type; ArrowInvalid for a cell of another type."""
+        """The wanted columns, all of one type but for times; ArrowInvalid where a cell is not of it."""
         self.broken.clear()
+        self.others.clear()
         read = pc.ReadOptions(column_names=self.names, use_threads=False, block_size=1 << 22)
         parse = pc.ParseOptions(
             delimiter=self.separator.decode(), invalid_row_handler=self._skip, ignore_empty_lines=True
         )
         convert = pc.ConvertOptions(
-            column_types=dict.fromkeys(self.wanted, kind),
+            column_types=dict.fromkeys(self.wanted, kind) | dict.fromkeys(self.texts, pa.string()),
             include_columns=list(self.wanted),
             null_values=MISSING,
             strings_can_be_null=True,
@@ -173,7 +199,11 @@ class _Table:
         return pc.read_csv(cast("Any", pa.BufferReader(pa.py_buffer(self.body))), read, parse, convert)
 
     def _skip(self, row: pc.InvalidRow) -> Literal["skip"]:
-        self.broken.append(row.actual_columns)
+        line = row.text or ""
+        if re.search(r"(^|[^\w.])[-+]?\d+([.,]\d+)?($|[^\w.])", line) and row.actual_columns > 1:
+            self.broken.append(row.actual_columns)
+        else:
+            self.others.append(line)
         return "skip"
 
 
@@ -190,23 +220,59 @@ def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[
 
 
 def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, list[Notice]]:
-    """The wanted columns, the number of rows, and a notice on non-numeric cells."""
+    """The wanted columns, the number of rows, and notices of lines and cells that are no numbers."""
+    notices: list[Notice] = []
     try:
         found = table.read(pa.float64())
-        return {n: _as_floats(found[n]) for n in table.wanted}, len(found), []
+        again = 0
     except pa.ArrowInvalid:
-        pass
-    try:
-        found = table.read(pa.string())
-    except pa.ArrowInvalid as e:
-        raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
-    values, bad = _cell_by_cell(found, table.wanted, table.decimal_comma)
-    notice = Notice(
-        "bad_cells",
-        f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
-        severity=grade_loss(bad, len(found) * len(table.wanted)),
-    )
-    return values, len(found), [notice]
+        try:
+            found = table.read(pa.string())
+        except pa.ArrowInvalid as e:
+            raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
+        found, again, bad = _as_numbers(found, table)
+        if bad:
+            notices.append(
+                Notice(
+                    "bad_cells",
+                    f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
+                    severity=grade_loss(bad, len(found) * len(table.wanted)),
+                )
+            )
+    if again or table.others:
+        lines = again + len(table.others)
+        notices.append(
+            Notice(
+                "lines_without_values",
+                f"{source}: {lines} {plural(lines, 'line', 'lines')} among the rows "
+                f"{plural(lines, 'is', 'are')} a header again or a comment and "
+                f"{plural(lines, 'was', 'were')} left out.",
+                severity="info",
+            )
+        )
+    values = {n: parse_times(found[n]) if n in table.texts else _as_floats(found[n]) for n in table.wanted}
+    return values, len(found), notices
+
+
+def _as_numbers(found: pa.Table, table: _Table) -> tuple[pa.Table, int, int]:
+    """Text cells as numbers, without rows of texts alone; how many these are, and other bad cells."""
+    columns, bad = [], np.zeros(len(found), np.int64)
+    for name in table.wanted:
+        cells = found[name]
+        if name in table.texts:
+            columns.append(cells)
+            continue
+        cells = compute.utf8_trim_whitespace(cells)
+        if table.decimal_comma:
+            cells = compute.replace_substring(cells, ",", ".")
+        good = compute.match_substring_regex(cells, _NUMBER)
+        bad += np.asarray(compute.fill_null(compute.invert(good), False).to_numpy())
+        columns.append(compute.if_else(good, cells, None).cast(pa.float64()))
+    whole = pa.table(columns, names=list(table.wanted))
+    numbers = len(table.wanted) - len(table.texts)
+    header = bad >= max(1, numbers)
+    left = int(bad.sum() - bad[header].sum())
+    return (whole.filter(pa.array(~header)) if header.any() else whole), int(header.sum()), left
 
 
 def _check_rows(rows: int, broken: Sequence[int], columns: int, source: str) -> list[Notice]:
@@ -252,35 +318,6 @@ def _as_floats(column: pa.ChunkedArray[Any]) -> Floats:
 def _plausible(x: Floats) -> Floats:
     x[~(np.abs(x) < LARGEST)] = np.nan
     return x
-
-
-def _cell_by_cell(
-    found: pa.Table, wanted: Sequence[str], decimal_comma: bool
-) -> tuple[dict[str, Floats], int]:
-    """Parse text cells one by one (damaged file: speed does not matter); count non-numeric ones."""
-    bad = 0
-    values: dict[str, Floats] = {}
-    for name in wanted:
-        out = np.full(len(found), np.nan)
-        for i, cell in enumerate(found[name].to_pylist()):
-            if cell is None:
-                continue
-            try:
-                out[i] = float(cell.replace(",", ".") if decimal_comma else cell)
-            except ValueError:
-                bad += 1
-        values[name] = _plausible(out)
-    return values, bad
-
-
-def guess_separator(lines: Sequence[bytes]) -> bytes | None:
-    """Separator that splits all given lines into the same number of cells, the most if several do."""
-    best, most = None, 1
-    for separator in SEPARATORS:
-        counts = {line.count(separator) for line in lines if line.strip()}
-        if len(counts) == 1 and (n := counts.pop() + 1) > most:
-            best, most = separator, n
-    return best
 
 
 def number_columns(titles: Sequence[str]) -> list[str]:

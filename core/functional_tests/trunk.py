@@ -63,7 +63,7 @@ def find_trunk_sensor(recording: UniformRecording) -> Segment:
             return segment
     raise EstimationError(
         "segments_missing",
-        "This test needs a sensor on the pelvis or the chest, and none of them measures; wear or map one.",
+        "This test requires a sensor on the pelvis or chest, and neither has data; attach or assign one.",
     )
 
 
@@ -81,8 +81,8 @@ def follow_trunk(recording: UniformRecording) -> TrunkMotion:
         raise EstimationError(
             "no_rest",
             Message(
-                "The sensor on the {segment} never rests for a second. Let the person sit or stand "
-                "still for a few seconds before the test begins.",
+                "The sensor on the {segment} is never still for one second. Ask the person to sit or stand "
+                "still for a few seconds before the test starts.",
                 segment=segment,
             ),
             sensor=segment,

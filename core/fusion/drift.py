@@ -99,10 +99,9 @@ def remove_relative_drift(
         # two sensors turn apart by the same angle: the first is told of, whatever the last digits are
         worst = max(largest, key=lambda s: round(largest[s], ALIKE_DIGITS))
         message = Message(
-            "The heading of {worst} drifted by up to {degrees:.0f}° against the reference and "
-            "was brought back to its mean over straight walking. Slow changes of rotation "
-            "posture during the take are taken out with it: read transverse angles as changes "
-            "within a stride.",
+            "The heading of {worst} drifted by up to {degrees:.0f}° from the reference and was realigned "
+            "to its mean in straight walking. Slow changes of rotational posture during the trial are "
+            "removed as well: interpret transverse angles as changes within a stride.",
             worst=worst,
             degrees=degrees(largest[worst]),
         )

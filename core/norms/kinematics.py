@@ -22,7 +22,7 @@ Zero = Literal["anatomical", "standing", "walking", "stride_mean"]
 nobody stood, its own mean over each stride."""
 
 _PLANE = "Low confidence outside the sagittal plane."
-_HEADING = "Low confidence: the transverse plane depends on the sensors' headings."
+_HEADING = "Low confidence: transverse angles depend on sensor headings."
 _JUDGEMENT: Final[Mapping[str, tuple[Literal["normal", "low"], str]]] = {
     "hip_flexion": ("normal", LEVEL),
     "knee_flexion": ("normal", LEVEL),

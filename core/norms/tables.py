@@ -14,7 +14,7 @@ WBDS = "Fukuchi, Fukuchi & Duarte 2018 (PeerJ 6:e4640), WBDS data set, CC BY 4.0
 WBDS_N: Mapping[str, int] = {"adult_21_84": 42, "adult_21_54": 25, "adult_55_84": 17}
 """Subjects per age group of the WBDS tables."""
 
-LEVEL = "The level depends on the protocol: published sets differ by up to 5° at hip and knee."
+LEVEL = "The level depends on the protocol: published data sets differ by up to 5° at the hip and knee."
 """Said wherever the level of an angle is compared (WBDS against Schwartz et al. 2008)."""
 
 ADULT_AGE = 18.0

@@ -16,9 +16,11 @@ from sagittal.core.parameters.catalogue import CATALOGUE, LIMIT_FIGURES, NormKey
 Sex = Literal["female", "male"]
 Pace = Literal["slow", "normal", "fast"]
 
-_NOT_LEVEL = "Not comparable: measured from the person's own standing, the reference is anatomical."
-_BAND = "The range defines the pace class, it is not mean ± SD."
-_COARSE = "Not comparable: the contacts of this take are too uncertain; wear a sensor on each foot."
+_NOT_LEVEL = (
+    "Not comparable: measured relative to the person's own standing, whereas the reference is anatomical."
+)
+_BAND = "The range defines the pace class; it is not mean ± SD."
+_COARSE = "Not comparable: the contacts in this trial are too uncertain; use a sensor on each foot."
 COARSE_S: Final = 0.05
 """Contacts less certain than this (s, in the median) put a share of the stride off by two points and more, a
 reference sd. Our choice."""
@@ -28,7 +30,10 @@ _SHARES: Final = frozenset(
      "initial_double_support_pct", "terminal_double_support_pct")
 )  # fmt: skip
 
-_WIDTH = "Not comparable: a walkway measures between the heels, we between the ankles, which is wider."
+_WIDTH = (
+    "Not comparable: walkways measure between the heels; Sagittal measures between the ankles, which is "
+    "wider."
+)
 """Heels lie 5 to 6 cm behind the ankles: with toes out by 7 to 10° that is 1 to 2 cm, half a reference sd."""
 
 _DIFFERS: Final[Mapping[str | None, str]] = {None: "", "ankles": _WIDTH}

@@ -127,8 +127,8 @@ def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notic
         Notice(
             "sensor_missing",
             Message(
-                "The {value} sensor sent nothing while the others stood; the take goes on without "
-                "it. Connect it and calibrate again.",
+                "The {value} sensor sent no data during quiet standing; recording continues without it. "
+                "Connect it and calibrate again.",
                 value=s,
             ),
             sensor=s,

@@ -203,8 +203,8 @@ class LiveCalibrator:
         self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
         if walked and seen.stood_s >= p.stand_s and (moved := self._moved(recording)):
             message = Message(
-                "{moved}: the sensor sits otherwise than when all stood before. What was walked until "
-                "now does not count; this standing does.",
+                "{moved}: the sensor has moved since the last quiet standing. The walk so far is discarded; "
+                "this quiet standing is used.",
                 moved=", ".join(moved),
             )
             self._stand(recording, seen)
@@ -220,7 +220,7 @@ class LiveCalibrator:
         found = self._calibration(recording) if walked >= p.first_look_s and look else None
         if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
             message = Message(
-                "Only {walked:.0f} s were walked in {longest_s:.0f} s, {walk_s:.0f} s or {steps} straight "
+                "Only {walked:.0f} s of walking in {longest_s:.0f} s; {walk_s:.0f} s or {steps} straight "
                 "steps are needed. Stand still again, then walk straight ahead.",
                 walked=walked,
                 longest_s=p.longest_s,
@@ -253,8 +253,8 @@ class LiveCalibrator:
             if found.posture != "standing":
                 raise SignalError(
                     "not_still",
-                    "A sensor moved slowly or one foot was ahead while all stood. Stand still for 3 s with "
-                    "both feet side by side, then walk straight ahead.",
+                    "A sensor moved slowly or one foot was in front during quiet standing. Stand still "
+                    "for 3 s with both feet side by side, then walk straight ahead.",
                 )
             least = p.least_steps if late else p.steps
             if found.straight_steps is None and late:
@@ -292,8 +292,8 @@ def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
     if (told := next(unknown, None)) is not None:
         return told
     message = Message(
-        "{walk_s:.0f} s of movement held about {steps} straight "
-        f"{plural(steps, 'step', 'steps')}, {{least_steps}} are needed. Stand still again, "
+        "{walk_s:.0f} s of movement contained about {steps} straight "
+        f"{plural(steps, 'step', 'steps')}; {{least_steps}} are needed. Stand still again, "
         "then walk straight ahead.",
         walk_s=params.walk_s,
         steps=steps,

@@ -50,7 +50,7 @@ NOT_LIVE: Final = (
     "pelvis and a whole leg. All is recorded and can be analysed afterwards."
 )
 BROKEN: Final = (
-    "The live filter lost its footing and shows no figure any more; recording goes on. Stand still and "
+    "The live filter diverged and the avatar is no longer shown; recording continues. Stand still and "
     "calibrate again; check which sensor is on which segment."
 )
 COURSES: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")

@@ -42,8 +42,8 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
     raise SignalError(
         "no_trunk_sensor",
         Message(
-            "Daily life needs a sensor on the chest or the lower back. Say in the mapping which "
-            "sensor was worn there (sensors found: {there}).",
+            "Daily-life analysis requires a sensor on the chest or lower back. Assign the sensor that "
+            "was worn there (sensors in the recording: {there}).",
             there=", ".join(there),
         ),
     )
@@ -61,7 +61,7 @@ def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     found = analysis.activity
     if found is None:
         level: Level = "poor"
-        report = QualityReport(level, ("Nothing could be read from the sensor.",), 0.0, 0.0, {}, (), ())
+        report = QualityReport(level, ("The sensor provided no usable data.",), 0.0, 0.0, {}, (), ())
         return replace(analysis, report=report)
     reasons = list_doubts(found)
     level = "good" if not reasons else "usable" if share_known(found) >= WORN_SHARE else "poor"
@@ -84,13 +84,13 @@ def list_doubts(found: ActivityResult) -> tuple[str, ...]:
     unknown = 1.0 - share_known(found)
     if unknown > 0.1:
         doubts.append(
-            Message("The posture is not known in {unknown:.0f} % of the time worn.", unknown=100 * unknown)
+            Message("Posture is unknown for {unknown:.0f} % of the wear time.", unknown=100 * unknown)
         )
     lost = 60.0 * found.minutes("gap") / total
     if lost > 0.1:
-        doubts.append(Message("{lost:.0f} % of the time nothing was recorded.", lost=100 * lost))
+        doubts.append(Message("No data for {lost:.0f} % of the time.", lost=100 * lost))
     if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
-        doubts.append("Without walking it is not certain which way is up.")
+        doubts.append("Without walking, the vertical is uncertain.")
     return tuple(doubts)
 
 

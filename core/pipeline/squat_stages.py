@@ -28,8 +28,8 @@ from sagittal.core.squat.side import find_squat_sides
 
 AGREED: Final = Notice(
     "mounting_agreed",
-    "The sensors are taken to sit as agreed for squats: on the flat of the shin, the front of the thigh, the "
-    "back. Ten degrees beside it turn the angles by as much.",
+    "The sensors are assumed to be placed as specified for squats: flat of the shin, front of the thigh, "
+    "lower back. A misplacement of ten degrees rotates the angles by as much.",
     severity="info",
 )
 
@@ -37,8 +37,8 @@ AGREED: Final = Notice(
 NO_HEIGHT: Final = Notice(
     "height_assumed",
     Message(
-        "Body height is not given; {NOMINAL_HEIGHT_M:.2f} m is taken. The way of the hip "
-        "down depends on it, the angles hardly.",
+        "Body height is missing; {NOMINAL_HEIGHT_M:.2f} m is assumed. Hip displacement depends on it; "
+        "angles hardly do.",
         NOMINAL_HEIGHT_M=NOMINAL_HEIGHT_M,
     ),
     severity="info",

@@ -55,7 +55,7 @@ CHAIN: Final[frozenset[Segment]] = frozenset(s for joint in LEG_JOINTS for s in 
 """With all of these worn the joints compare the clocks of both feet."""
 
 TRUNK_ALONE: Final = (
-    "No sensor could be calibrated. Cadence, step times and turns come from the trunk sensor alone, which "
+    "No sensor could be calibrated. Cadence, step times and turns are from the trunk sensor alone, which "
     "needs no calibration."
 )
 

@@ -173,8 +173,8 @@ def assess(
         notices.append(
             Notice(
                 "no_rest",
-                "The sensors are never at rest together for 1 s, so there is no standing posture to measure "
-                "from. Ask the person to stand still for 3 to 5 s at the start.",
+                "The sensors are never all at rest for 1 s, so there is no standing posture as a reference. "
+                "Ask the person to stand still for 3 to 5 s at the start.",
                 severity="info",
             )
         )
@@ -264,7 +264,7 @@ def _tell_magnetic(segment: Segment, magnetic: float | None, params: QualityPara
         Notice(
             "magnetic_disturbed",
             Message(
-                "The magnetic field at {segment} is off its value at rest in {magnetic:.0f} % of the "
+                "The magnetic field at {segment} deviates from its value at rest in {magnetic:.0f} % of the "
                 "samples (limit {magnetic_share:.0f} %). The magnetometer is not used for joint angles.",
                 segment=segment,
                 magnetic=100 * magnetic,
@@ -291,10 +291,10 @@ def _gap_notice(
         Notice(
             "gap",
             Message(
-                f"{{segment}} has no data in {{holes}} {plural(len(holes), 'stretch', 'stretches')} of "
-                "{GAP_S:g} s and more, {invalid:.1f} % of the take; the longest is {value:.2f} s. Angles "
-                "there are missing and strides that touch them are left out; heading is relearnt "
-                "from the straight walking after.",
+                f"{{segment}} has no data in {{holes}} {plural(len(holes), 'gap', 'gaps')} of at least "
+                "{GAP_S:g} s, {invalid:.1f} % of the trial; the longest is {value:.2f} s. Angles "
+                "there are missing and affected strides are excluded; heading is re-estimated "
+                "from the straight walking that follows.",
                 segment=segment,
                 holes=len(holes),
                 GAP_S=GAP_S,
@@ -378,7 +378,7 @@ def _level(
         if s.invalid_pct > 100 * params.invalid_poor:
             poor.append(
                 Message(
-                    "{segment} has no data in {invalid_pct:.0f} % of the take.",
+                    "{segment} has no data for {invalid_pct:.0f} % of the trial.",
                     segment=s.segment,
                     invalid_pct=s.invalid_pct,
                 )

@@ -178,8 +178,8 @@ def _long_device(s: LongStream, *, declared: bool, segment: Segment | None) -> D
             Notice(
                 "read_in_blocks",
                 Message(
-                    "Sensor {device_id} recorded {duration_s:.0f} h: it serves the protocol daily life. "
-                    "Its figures here are of the first ten minutes.",
+                    "Sensor {device_id} recorded {duration_s:.0f} h, which suits the daily-life "
+                    "protocol. Its values here are from the first ten minutes.",
                     device_id=s.device_id,
                     duration_s=s.duration_s / 3600,
                 ),

@@ -145,29 +145,29 @@ TOLD: Final[Mapping[int, tuple[str, str]]] = {
     DEAD: (
         "channel_stuck",
         (
-            "The {which} of {segment} is stuck at one value from {first:.1f} s on. This sensor is left out "
-            "from there; replace it."
+            "The {which} of {segment} is stuck at one value from {first:.1f} s on. This sensor is "
+            "excluded from then on; replace it."
         ),
     ),
     CLIPPED: (
         "channel_clipped",
         (
-            "The {which} of {segment} stays at the end of its range from {first:.1f} s on. This sensor is "
-            "left out from there; set a wider range."
+            "The {which} of {segment} is saturated from {first:.1f} s on. This sensor is excluded from "
+            "then on; set a wider range."
         ),
     ),
     FROZEN: (
         "sensor_frozen",
         (
-            "The sensor on {segment} sends one sample again and again from {first:.1f} s on. Such samples "
-            "count as lost; check its battery and radio."
+            "The sensor on {segment} repeats one sample from {first:.1f} s on. Such samples count as "
+            "lost; check its battery and radio link."
         ),
     ),
     LOOPED: (
         "samples_repeated",
         (
-            "The sensor on {segment} sends the same samples again from {first:.1f} s on. Repeated samples "
-            "count as lost; check its radio and software."
+            "The sensor on {segment} repeats earlier samples from {first:.1f} s on. Repeated samples "
+            "count as lost; check its radio link and software."
         ),
     ),
 }
@@ -240,8 +240,8 @@ def _look_at(watch: StuckWatch, signals: Sequence[SensorSignals], part: slice) -
 
 
 NONE_LEFT: Final = (
-    "No sensor measures for at least half of the take, so nothing can be said. Check the sensors named above "
-    "and record again."
+    "No sensor has data for at least half of the trial, so it cannot be analysed. Check the sensors "
+    "named above and record again."
 )
 
 

@@ -108,7 +108,7 @@ def _moving_acceleration(device: str, f: Facts) -> list[Notice]:
             )
         ]
     if m < 0.5 * GRAVITY:
-        return [_no_gravity(device, m, "in the middle of the take")]
+        return [_no_gravity(device, m, "mid-trial")]
     return [
         _say(
             "unit_suspect",

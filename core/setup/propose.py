@@ -57,18 +57,18 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
         turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
         which = _list(sorted(exchange.mirrored))
         said = Message(
-            "The accelerometer of {which} has its signs turned round: the joints beside it fit a mirror.",
+            "The accelerometer of {which} has inverted axes: adjacent joints match its mirror image.",
             which=which,
         )
         return SetupRepair("axes", (said,), exchange.ratio, corrections=turned)
     if exchange is not None and exchange.mixed_up:
         segments = {uniform.sensors[x].device_id: s for s, x in exchange.mixed_up.items()}
         moved: list[str] = [
-            Message("that of {value} is worn on {value2}", value=x, value2=s)
+            Message("the sensor assigned to {value} is worn on {value2}", value=x, value2=s)
             for s, x in exchange.mixed_up.items()
             if s != x
         ]
-        said = Message("The joints show that sensors are mixed up: {moved}.", moved=_list(moved))
+        said = Message("Joint motion shows that sensors are swapped: {moved}.", moved=_list(moved))
         return SetupRepair("labels", (said,), exchange.ratio, segments)
     if exchange is None or exchange.cosine is None:
         return _propose_legs(uniform)
@@ -107,7 +107,7 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
         said += follow
     return SetupRepair(
         "units",
-        (Message("Units or signs of {said} are not those of a body.", said=_list(said)),),
+        (Message("The units or signs of {said} are not plausible for body motion.", said=_list(said)),),
         np.inf,
         {},
         corrections,
@@ -137,7 +137,7 @@ def _propose_axes(
     which = _list(sorted(wrong))
     said: list[str] = [
         Message(
-            "The gyroscope of {which} does not turn as its accelerometer shows; other axes or units do.",
+            "The gyroscope of {which} does not match its accelerometer; other axes or units do.",
             which=which,
         )
     ]
@@ -158,7 +158,7 @@ def _propose_axes(
     if turned is None and not any(_leaves_hands_open(x) for x in gyr.values()):
         turned = frozenset()
     if turned is None:
-        said.append("Whether its accelerometer is turned round too cannot be told from these sensors.")
+        said.append("These sensors do not show whether its accelerometer is inverted as well.")
         return SetupRepair("axes", tuple(said), margin)
     corrections = {
         uniform.sensors[s].device_id: _correct_gyr(x, AGAINST if s in turned else AS_READ)
@@ -253,7 +253,9 @@ def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
         for side, other in zip(SIDES, reversed(SIDES), strict=True)
     }
     segments = {x.device_id: across.get(s, s) for s, x in uniform.sensors.items()}
-    evidence = "The pelvis is pushed away from the leg that swings: left and right sensors seem exchanged."
+    evidence = (
+        "The pelvis is pushed away from the swing leg: the left and right sensors appear to be swapped."
+    )
     return SetupRepair("labels", (evidence,), 1.0, segments)
 
 

@@ -56,9 +56,9 @@ class SetupRepair:
     def tell(self, severity: Literal["warning", "error"]) -> Notice:
         """Notice with the mistake and its correction."""
         todo = (
-            "A repair is proposed; confirm it and analyse again."
+            "A correction is proposed; confirm it and re-analyse."
             if self.can_be_applied
-            else "What would put it right cannot be said; check the set-up of the sensors."
+            else "No correction can be proposed; check the sensor set-up."
         )
         return Notice("setup_wrong", join_messages(*self.evidence, todo), severity=severity)
 

@@ -19,7 +19,7 @@ def find_squat_sides(recording: UniformRecording) -> tuple[Side, ...]:
     if not worn:
         raise EstimationError(
             "segments_missing",
-            "Squats need sensors on the pelvis, and on shank and thigh of each leg that squats; wear or map "
-            "them.",
+            "Squats require sensors on the pelvis and on the shank and thigh of each squatting leg; "
+            "attach or assign them.",
         )
     return worn

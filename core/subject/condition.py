@@ -23,23 +23,23 @@ Orthosis = Literal["none", "insole", "foot_lifter", "ankle_foot", "knee", "knee_
 Footwear = Literal["shoes", "orthopaedic_shoes", "socks", "barefoot"]
 
 CHOICES: Final[Mapping[str, Mapping[str, str]]] = {
-    "pace": {"comfortable": "own pace", "slow": "slow", "fast": "fast"},
+    "pace": {"comfortable": "comfortable pace", "slow": "slow", "fast": "fast"},
     "aid": {
         "none": "no aid",
         "stick": "stick",
-        "four_point_stick": "four-point stick",
+        "four_point_stick": "quad stick",
         "crutch": "one crutch",
         "crutches": "two crutches",
         "frame": "walking frame",
         "rollator": "rollator",
         "handrail": "handrail or bars",
-        "person": "a person's hand",
-        "harness": "weight support",
+        "person": "hand-held assistance",
+        "harness": "body-weight support",
     },
     "orthosis": {
         "none": "no orthosis",
         "insole": "insoles",
-        "foot_lifter": "foot lifter",
+        "foot_lifter": "foot-drop splint",
         "ankle_foot": "ankle-foot orthosis",
         "knee": "knee orthosis",
         "knee_ankle_foot": "knee-ankle-foot orthosis",
@@ -103,7 +103,7 @@ class WalkingCondition:
         """Names of the items that were not stated."""
         names = tuple(name for name, value in self.stated.items() if value is None)
         belt = self.protocol == "treadmill" and self.belt_speed_mps is None
-        return (*names, "speed of the belt") if belt else names
+        return (*names, "belt speed") if belt else names
 
     @property
     def is_at_own_pace(self) -> bool:
@@ -169,9 +169,7 @@ def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, .
         speeds = [
             "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
         ]
-        found.append(
-            Message("speed of the belt {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1])
-        )
+        found.append(Message("belt speed {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1]))
     for name, words in CHOICES.items():
         values = [getattr(c, name) for c in (a, b)]
         if values[0] != values[1]:

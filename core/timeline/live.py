@@ -134,7 +134,7 @@ class LiveAxis:
                 return None
             if queue.hold(t_us, batch):
                 self._notify(
-                    "out_of_order", queue, "sent samples that run backwards in time; they are left out."
+                    "out_of_order", queue, "sent samples with decreasing time stamps; they are excluded."
                 )
         if self._start_s is None and not self._begin():
             return None
@@ -165,7 +165,7 @@ class LiveAxis:
         self._origin_us = first_us + offset
         for x in self._queues.values():
             if x not in heard:
-                self._notify("sensor_missing", x, "sent nothing so far; the take goes on without it.")
+                self._notify("sensor_missing", x, "has sent no data so far; recording continues without it.")
         starts = [x.first_us + (self._clock.offset_us(x.stream) or 0) - self._origin_us for x in heard]
         self._start_s = float(max(starts) * 1e-6)
         return True
@@ -197,7 +197,7 @@ class LiveAxis:
         stretch = self.params.timeline.max_stretch * queue.samples / queue.rate_hz + self.params.longest_s
         if ahead_s <= min(allowed, self.params.longest_s) and queue.whole_s(first_us) <= stretch:
             return False
-        self._notify("clock_jump", queue, "has a clock that jumps; batches beyond the jump are left out.")
+        self._notify("clock_jump", queue, "has a clock jump; batches after the jump are excluded.")
         return True
 
     def _notify(self, code: str, queue: StreamQueue, what: str) -> None:
@@ -220,7 +220,7 @@ def _common_rate(queues: Sequence[StreamQueue], hello: Hello, params: TimelinePa
         raise SignalError(
             "no_mapping",
             Message(
-                "No sensor is worn on a segment; say which one is where (sensors: {named}).", named=named
+                "No sensor is assigned to a segment; assign the sensors (available: {named}).", named=named
             ),
         )
     slowest = min(queues, key=lambda x: x.rate_hz)

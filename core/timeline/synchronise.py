@@ -8,6 +8,7 @@ ones are invalid and hold the last value (docs/science/timeline.md, "Rule").
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,8 +35,7 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     params = params or TimelineParams()
     worn = _find_worn(recording)
     _refuse_copies(worn)
-    notices = list(recording.notices)
-    notices += [n for s in worn.values() for n in s.notices]
+    notices = [*recording.notices, *_merge_alike([n for s in worn.values() for n in s.notices])]
     usable = _find_usable(worn)
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
@@ -68,6 +68,15 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
     )
 
 
+def _merge_alike(notices: list[Notice]) -> list[Notice]:
+    """Merge notices of several sensors of one table that have the same words."""
+    merged: dict[tuple[str, str], Notice] = {}
+    for n in notices:
+        key = n.code, n.message
+        merged[key] = n if key not in merged else replace(n, sensor=None)
+    return list(merged.values())
+
+
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
     """The sensors mapped to a segment."""
     worn = {
@@ -80,8 +89,8 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
         raise SignalError(
             "recording_too_long",
             Message(
-                "The recording of “{too_long}” is too long for the protocol '{protocol}'. Cut out "
-                "the walk, or choose daily life (activity) for a sensor on the trunk.",
+                "The recording of “{too_long}” is too long for the protocol '{protocol}'. Extract the walk, "
+                "or choose daily life (activity) for a trunk sensor.",
                 too_long="”, “".join(too_long),
                 protocol=recording.protocol,
             ),
@@ -90,8 +99,7 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
         raise SignalError(
             "no_mapping",
             Message(
-                "No sensor is assigned to a segment; say which sensor is worn where (sensors found: "
-                "{streams}).",
+                "No sensor is assigned to a segment; assign the sensors (in the recording: {streams}).",
                 streams=", ".join(recording.streams),
             ),
         )
@@ -141,8 +149,8 @@ def _check_clocks(usable: dict[Segment, ImuStream]) -> None:
         raise SignalError(
             "no_common_clock",
             Message(
-                "The sensors are timed in different ways ({listed}) and cannot be aligned; give all "
-                "of them with a packet counter or with a time column.",
+                "The sensors use different time bases ({listed}) and cannot be aligned; provide a packet "
+                "counter or a time column for all of them.",
                 listed=listed,
             ),
         )
@@ -193,8 +201,8 @@ def _common_range(
         raise SignalError(
             "no_overlap",
             Message(
-                "The sensors were never recording at the same time ({listed}); the files seem to "
-                "come from different takes.",
+                "The sensors never recorded at the same time ({listed}); the files appear to be from "
+                "different trials.",
                 listed=listed,
             ),
         )
@@ -202,8 +210,8 @@ def _common_range(
         raise SignalError(
             "too_short",
             Message(
-                "Only {start:.1f} s were recorded by all sensors together; at least {min_duration_s:g} "
-                "s are needed (1 s of quiet standing and two strides). Record a longer take.",
+                "All sensors together recorded only {start:.1f} s; at least {min_duration_s:g} s are needed "
+                "(1 s of quiet standing and two strides). Record a longer trial.",
                 start=end - start,
                 min_duration_s=params.min_duration_s,
             ),
@@ -233,8 +241,8 @@ def _common_range(
             Notice(
                 "cropped",
                 Message(
-                    "The sensors did not start and stop together. Left out, as only some of them "
-                    "recorded it: {first:.1f} s at the start, {end:.1f} s at the end.",
+                    "The sensors did not start and stop together. Excluded because only some of them were "
+                    "recording: {first:.1f} s at the start, {end:.1f} s at the end.",
                     first=start - first,
                     end=last - end,
                 ),

@@ -44,7 +44,7 @@ def get(c: Connection, user_id: str) -> Row[Any]:
     """Return one account; raise Problem 404 if it does not exist."""
     row = c.execute(select(user).where(user.c.id == user_id)).one_or_none()
     if row is None:
-        raise Problem(404, "user_not_found", "There is no such account.")
+        raise Problem(404, "user_not_found", "No such account.")
     return row
 
 
@@ -63,7 +63,7 @@ def change(c: Connection, user_id: str, values: dict[str, object]) -> Row[Any]:
         raise Problem(
             409,
             "last_administrator",
-            "This is the last active administrator. Make somebody else an administrator first.",
+            "This is the last active administrator. Make another user an administrator first.",
         )
     return get(c, user_id)
 
@@ -98,7 +98,7 @@ def check_password(
         raise
     if not is_right or row is None:
         trail.record_refused("sign_in.failed", "user", None if row is None else row.id, address)
-        raise Problem(status, "wrong_password", "Name or password is wrong. Check both and try again.")
+        raise Problem(status, "wrong_password", "Incorrect name or password. Check both and try again.")
     throttle.withdraw(name, address, begun)
     throttle.succeed(name, address)
     return row

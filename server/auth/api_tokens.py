@@ -111,7 +111,7 @@ def revoke(c: Connection, user_id: str, token_id: str) -> None:
     """Revoke one token of a user; raises Problem 404."""
     gone = c.execute(delete(api_token).where(api_token.c.id == token_id, api_token.c.user_id == user_id))
     if not gone.rowcount:
-        raise Problem(404, "token_not_found", "There is no such token; it may have been revoked already.")
+        raise Problem(404, "token_not_found", "No such token; it may already have been revoked.")
 
 
 def revoke_all(c: Connection, user_id: str) -> None:

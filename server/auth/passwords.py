@@ -63,7 +63,7 @@ def _slot() -> Iterator[None]:
         raise Problem(
             503,
             "busy",
-            "Too many people are signing in at this moment. Try again in some seconds.",
+            "Too many people are signing in at the moment. Try again in a few seconds.",
             headers={"Retry-After": "5"},
         )
     try:

@@ -44,7 +44,7 @@ class CodeNeeded(Problem):
         super().__init__(
             401,
             "code_needed",
-            "This account has a second factor. Give the figures of your authenticator, or a recovery code.",
+            "This account has a second factor. Enter the code from your authenticator, or a recovery code.",
         )
 
 
@@ -55,7 +55,7 @@ class CodeWrong(Problem):
         super().__init__(
             status,
             "wrong_code",
-            "The code is wrong or was used already. Wait for the next one; check your telephone's clock.",
+            "The code is wrong or has already been used. Wait for the next one; check your phone's clock.",
         )
 
 
@@ -66,8 +66,8 @@ class KeyOfFactorsUnusable(Problem):
         super().__init__(
             503,
             "second_factor_key_unusable",
-            "The key of second factors is missing or wrong. The operator puts it back. "
-            "A recovery code still works.",
+            "The encryption key of second factors is missing or wrong and must be restored by the "
+            "administrator. Recovery codes still work.",
         )
 
 
@@ -88,7 +88,7 @@ def begin(c: Connection, key_file: Path, user_id: str, name: str) -> SecondFacto
     Problem 409 if a second factor is active; KeyOfFactorsUnusable, also if secrets exist without a key.
     """
     if is_on(c, user_id):
-        raise Problem(409, "second_factor_on", "There is a second factor already. Remove it first.")
+        raise Problem(409, "second_factor_on", "A second factor is already set up. Remove it first.")
     secret = pyotp.random_base32()
     c.execute(delete(second_factor).where(second_factor.c.user_id == user_id))
     _make_missing_key(c, key_file)

@@ -103,7 +103,7 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         raise Problem(
             409,
             "no_keys_here",
-            "Keys work where the address is a name and begins with https, or on localhost.",
+            "Security keys require an https address with a host name, or localhost.",
         )
     if not second_factor.is_on(c, user_id):
         raise Problem(
@@ -241,7 +241,7 @@ def remove(c: Connection, site: Site, user_id: str, key_id: str) -> None:
     """Delete one key of an account; if none is left here, codes are accepted again. Raises Problem 404."""
     mine = (security_key.c.id == key_id, security_key.c.user_id == user_id)
     if not c.execute(delete(security_key).where(*mine)).rowcount:
-        raise Problem(404, "key_not_found", "There is no such key; it may have been removed already.")
+        raise Problem(404, "key_not_found", "No such key; it may already have been removed.")
     if not list_usable(c, site, user_id):
         second_factor.take_keys_only(c, user_id, only=False)
 

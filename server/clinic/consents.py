@@ -57,13 +57,15 @@ def give(
     today = now().date()
     day = given_on or today
     if purpose not in CONSENT_PURPOSES:
-        raise ServiceError("bad_value", f"'{purpose}' is no purpose; expected {', '.join(CONSENT_PURPOSES)}.")
+        raise ServiceError(
+            "bad_value", f"'{purpose}' is not a valid purpose; expected {', '.join(CONSENT_PURPOSES)}."
+        )
     if not 1 <= len(evidence.strip()) <= 200:
-        raise ServiceError("bad_value", "Say in 1 to 200 characters where the consent is written.")
+        raise ServiceError("bad_value", "State in 1 to 200 characters where the consent is documented.")
     if not dt.date(1900, 1, 1) <= day <= today:
         raise ServiceError("bad_value", f"The day is {day.isoformat()}. Expected today or an earlier day.")
     if any(one.purpose == purpose and one.withdrawn_on is None for one in of_patient(c, patient_id)):
-        raise Conflict("agreed_already", "This is written down already and holds.")
+        raise Conflict("agreed_already", "This consent is already recorded and in force.")
     consent_id = new_id()
     c.execute(
         insert(consent).values(
@@ -85,7 +87,7 @@ def withdraw(c: Connection, actor: audit.Actor | None, consent_id: str) -> Conse
     """Record a withdrawal as of today; raises NotFound, Conflict withdrawn_already."""
     current = get(c, consent_id)
     if current.withdrawn_on is not None:
-        raise Conflict("withdrawn_already", "That it was withdrawn is written down already.")
+        raise Conflict("withdrawn_already", "The withdrawal is already recorded.")
     c.execute(update(consent).where(consent.c.id == consent_id).values(withdrawn_on=now().date()))
     detail = {"consent_id": consent_id, "purpose": current.purpose}
     audit.record(c, actor, "consent.withdrawn", "patient", current.patient_id, detail)

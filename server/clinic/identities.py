@@ -240,14 +240,15 @@ def _read_keys(c: Connection, key_file: Path) -> FieldKeys:
     """Keys in the file, which must include the one in use; raises Conflict, KeyUnusable."""
     if not are_kept(c, key_file):
         raise Conflict(
-            "identities_off", "This clinic keeps no names: the operator makes a key for them first."
+            "identities_off",
+            "This clinic does not store names: the administrator must create an encryption key first.",
         )
     keys, sealing = read_keys(key_file), _find_sealing(c)
     if sealing is not None and not keys.has(sealing):
         raise KeyUnusable(
             "identity_key_wrong",
-            f"Names are encrypted by key {sealing}; the key file of this computer holds {keys.name}. "
-            "The operator puts the right file there.",
+            f"Names are encrypted with key {sealing}, but the key file on this computer holds "
+            f"{keys.name}. The administrator must install the right file.",
         )
     return keys
 

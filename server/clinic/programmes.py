@@ -218,12 +218,12 @@ def _visit(c: Connection, visit_id: str) -> Any:
 
 def _check_session(c: Connection, row: Any, session_id: str) -> None:
     if sessions.get(c, session_id).patient_id != row.patient_id:
-        raise Conflict("other_patient", "This session belongs to another patient.")
+        raise Conflict("other_patient", "This visit belongs to another patient.")
     if row.session_id not in {None, session_id}:
-        raise Conflict("visit_taken", f"{row.label} has a session already; unlink that one first.")
+        raise Conflict("visit_taken", f"{row.label} already has a visit; unlink it first.")
     linked = visit_of(c, session_id)
     if linked is not None and linked.id != row.id:
-        raise Conflict("session_planned", f"This session is {linked.label} already; unlink it there first.")
+        raise Conflict("session_planned", f"This visit is already {linked.label}; unlink it there first.")
 
 
 _VISITS = select(planned_visit, session.c.performed_on).join(

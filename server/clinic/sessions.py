@@ -263,10 +263,10 @@ _OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).orde
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A session has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", f"A visit has no {', '.join(sorted(unknown))}.")
     checked = dict(values)
     if "title" in checked and not 1 <= len(str(checked["title"])) <= 200:
-        raise ServiceError("bad_value", "A session's title has 1 to 200 characters.")
+        raise ServiceError("bad_value", "A visit's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
         raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
     for name, words in CHOICES.items():

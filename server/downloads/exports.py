@@ -99,7 +99,7 @@ def submit(
     if chosen not in kinds.list_possible(record.files):
         lacking = ", ".join(name for name in chosen.needs if name not in record.files)
         raise Conflict(
-            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” is made from."
+            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” requires."
         )
     session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
     params = _collect_params(c, patient, session, record, [chosen])

@@ -75,12 +75,12 @@ def list_visits(c: Connection, user: Identity, choice: StudyChoice) -> list[Sess
 def check_size(chosen: Sequence[Session]) -> None:
     """Reject a study with no visits or too many; raises Conflict no_visits, too_many_visits."""
     if not chosen:
-        raise Conflict("no_visits", "No visit fits this choice. Choose another period or protocol.")
+        raise Conflict("no_visits", "No visit matches. Choose another period or protocol.")
     if len(chosen) > MOST_VISITS:
         raise Conflict(
             "too_many_visits",
-            f"{len(chosen)} visits fit this choice, at most {MOST_VISITS} go into one study. "
-            "Choose a shorter period and put the tables together.",
+            f"{len(chosen)} visits match; a study can have at most {MOST_VISITS}. Choose shorter periods "
+            "and merge the tables.",
         )
 
 
@@ -110,7 +110,7 @@ def make_study(
         record = records.get(s.id)
         labels = _label(person, s, first[s.patient_id])
         if record is None:
-            lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse it, or leave it out.")
+            lacking = SagittalError("no_analysis", "This visit has no analysis. Analyse or exclude it.")
             takes.append(StudyTake(name, labels, 0, {}, lacking, dict, lambda: None))
         else:
             done = AnalysedSession(s, record, edits[record.id])

@@ -101,7 +101,7 @@ EVENTS: Final = {
     },
     "side": {"Description": "Foot or leg", "Levels": {"left": "left", "right": "right"}},
     "source": {"Description": "Detector that found a contact; manual: set by a person"},
-    "counted": {"Description": "Whether a stride counts in means", "Levels": {"1": "yes", "0": "left out"}},
+    "counted": {"Description": "Whether a stride counts in means", "Levels": {"1": "yes", "0": "excluded"}},
     "excluded_reason": {"Description": "Rule, or manual: and a person's words, why a stride was left out"},
 }
 

@@ -55,18 +55,22 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         "bids",
         "zip",
         "BIDS data set",
-        "What the sensors measured, contacts and strides as BIDS-motion, without a date",
+        "Sensor signals, contacts and strides as BIDS-motion, without dates",
         (signals.NAME,),
     ),
     ExportKind(
         "fhir",
         "json",
         "FHIR bundle",
-        "Every value and the signed report for a hospital's system, FHIR R4; preliminary until signed",
+        "All values and the signed report for a hospital system, FHIR R4; preliminary until signed",
         hands_on_signed=True,
     ),
     ExportKind(
-        "walk", "html", "3D walk", "The moving figure as one page that opens without a server", (POSES,)
+        "walk",
+        "html",
+        "3D walk",
+        "The animated avatar as a single page that opens without a server",
+        (POSES,),
     ),
 )
 """In the order in which they are offered."""

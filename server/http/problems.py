@@ -243,12 +243,14 @@ SENTENCES = {
     "bad_request": "The request could not be read. Check that its body is valid and complete.",
     "not_signed_in": "You are not signed in, or the session has ended. Sign in and try again.",
     "forbidden": "Your role does not allow this. Ask an administrator if you need it.",
-    "not_found": "There is nothing at this address, or it has been deleted.",
+    "not_found": "Nothing exists at this address, or it has been deleted.",
     "method_not_allowed": "This address does not offer that method; see /api/v1/openapi.json.",
-    "database_busy": "Another change takes unusually long. Try again in some seconds.",
+    "database_busy": "Another change is taking unusually long. Try again in a few seconds.",
     "not_storable": "A text is too long or has a character that cannot be stored. Change it, then try again.",
-    "store_away": "The stored files cannot be reached now, so nothing was changed. Try again in a minute; if "
-    "it lasts, tell the administrator.",
-    "store_refuses": "The store of files refuses the server. Tell the administrator, then try again.",
+    "store_away": "The file storage is unavailable, so nothing was changed. Try again in a minute; if the "
+    "problem persists, inform the administrator.",
+    "store_refuses": (
+        "The file storage denied access to the server. Inform the administrator, then try again."
+    ),
     "internal_error": "Something went wrong on the server. The server's log has the details; try again.",
 }

@@ -339,7 +339,7 @@ def describe_failure(error: Exception) -> Notice:
         return Notice(error.code, error.message, severity="error")
     return Notice(
         "live_estimate_failed",
-        "The live estimate of this take stopped on an error of the program; the take itself is recorded and "
-        "will be analysed at its end. The server's log has the details; please report it.",
+        "The live estimate of this trial stopped due to a program error; the trial is still being "
+        "recorded and will be analysed afterwards. Details are in the server log; please report them.",
         severity="error",
     )

@@ -186,12 +186,14 @@ class Hub:
         take = self._takes.get(row.id)
         if take is None:
             self.owner.require(row)
-            raise Conflict("no_tablet", "No tablet has joined this take yet; enter its code on the tablet.")
+            raise Conflict(
+                "no_tablet", "No tablet has joined this recording yet; enter the code on the tablet."
+            )
         live_events.check_value(name, value)
         if name in ("start", "stop"):
             if take.tablet is None:
                 raise Conflict(
-                    "tablet_lost", "The tablet is not connected; wait for it, or end the take here."
+                    "tablet_lost", "The tablet is not connected; wait for it, or end the recording here."
                 )
             take.tablet.say(protocol.command("start" if name == "start" else "stop"))
         if name == "undo_mark" and not take.steered.marks:
@@ -220,7 +222,9 @@ class Hub:
         answer = take.recorder.finish()
         if answer.close is not None:
             self._ending.unask(take)
-            raise Conflict(answer.reason, "The server's disk refuses; make room and try again.")
+            raise Conflict(
+                answer.reason, "The server cannot write to its disk; free some space and try again."
+            )
         await take.over.wait()
         return await asyncio.to_thread(self.rows.take, row.id)
 
@@ -303,7 +307,7 @@ class Hub:
         for take_id in takes:
             take = self._takes.get(take_id)
             if take is not None:
-                _notify(take, "warn", "The live estimate starts again; nothing recorded is lost.")
+                _notify(take, "warn", "The live estimate restarts; no recorded data is lost.")
 
     def _report(self, report: Report) -> None:
         name = getattr(report, "take", "")

@@ -105,7 +105,7 @@ async def stream(ws: WebSocket) -> None:
 def _not_valid() -> ProtocolError:
     return ProtocolError(
         "token_not_valid",
-        "The token is not valid for this take, or has expired; pair with a new code.",
+        "The token is not valid for this recording, or has expired; pair with a new code.",
         CloseCode.UNAUTHORISED,
     )
 
@@ -131,7 +131,8 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
         take = await hub.enter(row, hello)
     except TimeoutError:
         _refuse(
-            tablet, ProtocolError("no_hello", "No hello came in time; connect again.", CloseCode.NO_HELLO)
+            tablet,
+            ProtocolError("no_hello", "No hello message arrived in time; connect again.", CloseCode.NO_HELLO),
         )
     except ProtocolError as error:
         _refuse(tablet, error)
@@ -196,7 +197,7 @@ def _say_over(tablet: Tablet, row: live.LiveTakeRecord) -> None:
         tablet.say(protocol.announce_finish(row.recording_id, row.problem))
         tablet.shut(CloseCode.DONE if row.state == "finished" else CloseCode.ENDED, "take_ended")
     else:
-        _refuse(tablet, ProtocolError("take_ended", "This take is over.", CloseCode.ENDED))
+        _refuse(tablet, ProtocolError("take_ended", "This recording has ended.", CloseCode.ENDED))
 
 
 def _refuse(tablet: Tablet, error: ProtocolError) -> None:

@@ -40,9 +40,11 @@ DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
 }
 """What the other sensors say of one (core/agreement/live.py) → its state and words."""
 TEST_PROBLEMS: Final[Mapping[str, str]] = {
-    "segments_missing": "This test needs a sensor that is not worn: pelvis or chest, or for a walk the feet.",
-    "stepped": "The person moved. Stand still again; the time begins anew.",
-    "trial_too_long": "No end was found in three minutes. Begin again.",
+    "segments_missing": (
+        "This test requires a sensor on the pelvis or chest or, for walking tests, on both feet."
+    ),
+    "stepped": "The person moved. Stand still again; the time restarts.",
+    "trial_too_long": "No end detected within three minutes. Start over.",
 }
 """Why a guided test began anew, or cannot begin (core/functional_tests/guided.py)."""
 CURVE_POINTS: Final = 51
@@ -279,7 +281,7 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
     if row.silent_s > STALE_S:
         return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
     if row.stuck:
-        return "bad", "does not measure"
+        return "bad", "no valid data"
     if row.lost_share > LOST_BAD:
         return "bad", f"{100.0 * row.lost_share:.0f} % lost"
     if row.doubt is not None:
@@ -287,7 +289,7 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
     if row.lost_share > LOST_WARN:
         return "warn", f"{100.0 * row.lost_share:.0f} % lost"
     if row.saturated_share > SATURATED_WARN:
-        return "warn", "at its range"
+        return "warn", "saturated"
     if battery_pct is not None and battery_pct < BATTERY_WARN_PCT:
         return "warn", "battery low"
     return "ok", ""

@@ -45,7 +45,8 @@ class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
 
     def __init__(self) -> None:
         super().__init__(
-            "token_not_valid", "The token is not valid for this take, or has expired; pair with a new code."
+            "token_not_valid",
+            "The token is not valid for this recording, or has expired; pair with a new code.",
         )
 
 
@@ -121,7 +122,7 @@ class FilmIntake:
         with self._lock:
             film = self._find(take_id)
             if film is None:
-                raise NotFound("film of take", take_id)
+                raise NotFound("video of trial", take_id)
             if number > film.pieces:
                 raise Conflict("film_gap", f"Piece {number} came, expected {film.pieces}. Send that first.")
             if number == film.pieces and piece:
@@ -178,7 +179,10 @@ class FilmIntake:
     def _append(self, film: _OpenFilm, piece: bytes) -> None:
         limit = self._settings.max_file_bytes
         if film.size + len(piece) > limit:
-            raise TooLarge("file_too_large", f"A film has at most {limit / 1e6:g} MB here; it ends before.")
+            raise TooLarge(
+                "file_too_large",
+                f"A video may have at most {limit / 1000000.0:g} MB here and is stopped before that.",
+            )
         receiving.require_room(self._blobs, self._settings, len(piece))
         try:
             film.log.append(record("B", piece))
@@ -221,7 +225,9 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bo
         opener = live_recordings.find_opener(c, take)
     stored = take.recording_id is not None
     if take.is_open or (not stored and live_recordings.log_path(path.parent, take_id).exists()):
-        raise Conflict("take_open", "The take is not over and stored yet; ask again in a moment.")
+        raise Conflict(
+            "take_open", "The recording has not finished and been stored yet; try again in a moment."
+        )
     try:
         attached = stored and _keep(db, blobs, settings, opener, take, path)
         if not attached:

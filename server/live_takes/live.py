@@ -112,7 +112,7 @@ def open_take(
     earlier = current(c, session_id)
     if earlier is not None and earlier.is_open:
         raise Conflict(
-            "take_open", "This session has an open live take; ask for a new code or close it first."
+            "take_open", "This visit has an open live recording; request a new code or close it first."
         )
     code, take_id = _new_code(), new_id()
     c.execute(
@@ -148,7 +148,7 @@ class CodeNotValid(ServiceError):  # noqa: N818 - what the person reads
     def __init__(self) -> None:
         super().__init__(
             "code_not_valid",
-            "This code has been used, has expired, or was mistyped. Ask for a new one on the live page.",
+            "This code has been used, has expired, or was mistyped. Request a new one on the live page.",
         )
 
 
@@ -236,7 +236,7 @@ def get(c: Connection, take_id: str) -> LiveTakeRecord:
     """One take; raises NotFound."""
     row = c.execute(_QUERY.where(live_take.c.id == take_id)).first()
     if row is None:
-        raise NotFound("live take", take_id)
+        raise NotFound("live recording", take_id)
     return LiveTakeRecord(**row._asdict())
 
 
@@ -257,7 +257,7 @@ def require_open(c: Connection, session_id: str) -> LiveTakeRecord:
     sessions.get(c, session_id)
     this = current(c, session_id)
     if this is None or not this.is_open:
-        raise Conflict("no_open_take", "This session has no open live take; start one first.")
+        raise Conflict("no_open_take", "This visit has no open live recording; start one first.")
     return this
 
 

@@ -129,11 +129,11 @@ def adopt(
         raise NotFound("live log", take_id)
     log = read_log(path, is_known=False)
     if not log.batches:
-        raise Conflict("take_empty", f"{path.name} holds no sample that can be read; it was left as it is.")
+        raise Conflict("take_empty", f"{path.name} has no readable sample; it was left unchanged.")
     with db.write() as c:
         sessions.get(c, session_id)
         if c.execute(select(live_take.c.id).where(live_take.c.id == take_id)).first():
-            raise Conflict("take_known", f"The take {take_id} belongs to a session already.")
+            raise Conflict("take_known", f"Recording {take_id} already belongs to a visit.")
         c.execute(
             insert(live_take).values(
                 id=take_id,

@@ -99,7 +99,8 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
             problem = Problem(
                 503,
                 "node_lost",
-                f"The web server '{node.name}' did not answer. See whether it was done before trying again.",
+                f"The web server '{node.name}' did not respond. Check whether the request was carried out "
+                "before trying again.",
                 headers={"Retry-After": "5"},
             )
             await send_problem(problem, scope, receive, send)

@@ -27,7 +27,7 @@ class KnownNodes:
             if lines:
                 sender = _read(scope["app"].state.nodes, lines, scope)
                 if sender is None:
-                    detail = "The request pretends to come from another server. Ask without its header."
+                    detail = "The request claims to come from another server. Send it without that header."
                     await send_problem(Problem(403, "not_a_node", detail), scope, receive, send)
                     return
                 asks, client, scheme = sender

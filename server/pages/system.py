@@ -29,11 +29,11 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 PART_WORDS: Final = {
     "database": "Database",
     "files": "Stored files",
-    "schema": "Schema of the database",
+    "schema": "Database schema",
     "disk": "Free disk space",
     "workers": "Workers",
-    "estimators": "Estimators of live takes",
-    "node": "This web server among the others",
+    "estimators": "Live estimators",
+    "node": "This web server within the cluster",
 }
 
 

@@ -28,7 +28,10 @@ CALIBRATIONS: Final = (
     (
         "swing",
         "Stand and swing each leg",
-        "Stand still, hold a rail. Swing each leg at least 10 times from the hip, further forward than back.",
+        (
+            "Stand still and hold a rail. Swing each leg from the hip at least 10 times, further forward "
+            "than back."
+        ),
     ),
     (
         "bow",
@@ -38,17 +41,23 @@ CALIBRATIONS: Final = (
     (
         "table",
         "From the table",
-        "For squats: sensors lie still on the table, arrows forward. Put all on within a minute, then stand.",
+        (
+            "For squats: place the sensors on the table, arrows forward, and keep them still. Attach all of "
+            "them within a minute, then stand still."
+        ),
     ),
     (
         "declared",
-        "Mounting as declared",
-        "Nobody has to move: the recording's manifest says how each sensor sits. Stand still for 3 s.",
+        "Declared placement",
+        "No movement needed: the manifest declares the placement of each sensor. Stand still for 3 s.",
     ),
     (
         "take",
-        "From the take itself",
-        "Who cannot stand still just walks. The walk itself calibrates; angles then have no level.",
+        "From the trial itself",
+        (
+            "For people who cannot stand still: the walk itself is used for calibration; angles then have no "
+            "absolute level."
+        ),
     ),
 )
 """Ways to calibrate: name of the drawing, title, what to do. The analysis finds by itself which was done."""
@@ -57,19 +66,23 @@ TEST_PROTOCOLS: Final = (
     (
         "tug",
         "Timed up and go",
-        "Sit quietly, rise, walk 3 m, turn, walk back, sit down. Sensor on pelvis or chest.",
+        "Sit quietly, stand up, walk 3 m, turn, walk back, sit down. Sensor on pelvis or chest.",
     ),
     (
         "five_sit_to_stand",
         "Five times sit to stand",
-        "Sit quietly, rise and sit down five times with folded arms. Sensor on pelvis or chest.",
+        "Sit quietly, stand up and sit down five times with arms folded. Sensor on pelvis or chest.",
     ),
     (
         "walk_10m",
         "Ten-metre walk",
         "Quiet standing, 14 m straight ahead, quiet standing. Sensors on both feet.",
     ),
-    ("walk_6min", "Six-minute walk", "Quiet standing, then six minutes to and fro. Sensors on both feet."),
+    (
+        "walk_6min",
+        "Six-minute walk",
+        "Quiet standing, then walk back and forth for six minutes. Sensors on both feet.",
+    ),
     (
         "standing_eyes_open",
         "Standing, eyes open",
@@ -78,7 +91,7 @@ TEST_PROTOCOLS: Final = (
     (
         "standing_eyes_closed",
         "Standing, eyes closed",
-        "The same with closed eyes, somebody beside the person.",
+        "The same with eyes closed, with someone standing next to the person.",
     ),
 )
 """Functional tests."""
@@ -88,10 +101,10 @@ TEST_NAMES: Final = frozenset(value for value, _, _ in TEST_PROTOCOLS)
 PROTOCOL_NAMES: Final = {value: name for value, name, _ in (*PROTOCOLS, *TEST_PROTOCOLS)}
 
 ROLE_WORDS: Final[Mapping[Role, str]] = {
-    Role.ADMIN: "Everything, users and the audit log included.",
+    Role.ADMIN: "Full access, including users and the audit log.",
     Role.CLINICIAN: "Patients, uploads, analyses and results.",
-    Role.ASSISTANT: "Adds sessions and uploads recordings; sees what was found in them, not the results.",
-    Role.VIEWER: "Reads patients and results, changes nothing.",
+    Role.ASSISTANT: "Adds visits and uploads recordings; sees the recording check but not the results.",
+    Role.VIEWER: "Views patients and results; cannot change anything.",
 }
 
 SEGMENT_NAMES: Final = {

@@ -20,8 +20,9 @@ BLOCKS: Final = frozenset({"p", "li", "td", "th", "dt", "dd", "h1", "h2", "h3", 
 """What holds lines of text."""
 
 MISSING: Final = (
-    "This server makes no PDF: WeasyPrint or the system library Pango is missing. Install 'sagittal[pdf]' "
-    "and libpango-1.0-0, libpangoft2-1.0-0; or print the page and choose PDF as the printer."
+    "This server cannot create PDFs: WeasyPrint or the system library Pango is missing. Install "
+    "'sagittal[pdf]' and libpango-1.0-0, libpangoft2-1.0-0; or print the page and choose PDF as the "
+    "printer."
 )
 
 

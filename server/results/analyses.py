@@ -163,7 +163,7 @@ def get_shown(c: Connection, session_id: str) -> AnalysisRecord:
     sessions.get(c, session_id)
     record = latest(c, session_id)
     if record is None:
-        raise NotFound("analysis of session", session_id)
+        raise NotFound("analysis of visit", session_id)
     return record
 
 

@@ -42,17 +42,15 @@ class SessionPair:
         old, new = self.before, self.after
         if unlike := compare_conditions(old.condition, new.condition):
             reasons.append(
-                f"The conditions differ: {'; '.join(unlike)}. What differs may come from that, so no "
-                "difference is called a change."
+                f"The conditions differ: {'; '.join(unlike)}. Differences may be due to this and are not "
+                "reported as changes."
             )
         elif old.session.feedback:
-            reasons.append("Both were walked with feedback, so no difference is called a change.")
+            reasons.append("Both were walked with feedback, so differences are not reported as changes.")
         elif unstated := new.condition.unstated:
-            reasons.append(
-                f"Not stated in either session: {', '.join(unstated)}. They are taken to be alike."
-            )
+            reasons.append(f"Not stated for either visit: {', '.join(unstated)}. Assumed to be the same.")
         if _sensors(old) != _sensors(new):
-            reasons.append("Other segments carried sensors in the two sessions.")
+            reasons.append("The two visits used sensors on different segments.")
         if old.found.config_sha256 != new.found.config_sha256:
             reasons.append("The two analyses have different settings; run the earlier one again to compare.")
         elif old.found.code_version != new.found.code_version:
@@ -71,10 +69,10 @@ def pair(c: Connection, session_id: str, other_id: str) -> SessionPair:
     NotFound: a session or its result. Conflict: other_patient, same_session.
     """
     if session_id == other_id:
-        raise Conflict("same_session", "A session is compared with another one, not with itself.")
+        raise Conflict("same_session", "A visit cannot be compared with itself.")
     ends = [_analysed(c, sid) for sid in (session_id, other_id)]
     if ends[0].session.patient_id != ends[1].session.patient_id:
-        raise Conflict("other_patient", "These sessions belong to different patients.")
+        raise Conflict("other_patient", "These visits belong to different patients.")
     ends.sort(key=lambda a: _moment(a.session))
     return SessionPair(patients.get(c, ends[0].session.patient_id), *ends)
 

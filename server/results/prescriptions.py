@@ -70,7 +70,7 @@ def write(
     if entry.shared and draft.side is not None:
         raise ServiceError(
             "both_sides",
-            f"{entry.label} is the same for both sides of a walk, so the {draft.side} side is not trained "
+            f"{entry.label} is common to both sides of a walk, so the {draft.side} side cannot be trained "
             "alone. Expected both sides, or another parameter.",
         )
     targeted = _with_target(c, reviewed, patient, draft)

@@ -66,9 +66,9 @@ class StoredAnalysis:
         if stopped is not None:
             return f"The analysis stopped before events were looked for. {speak_places(stopped)}"
         if self.bundle.repetitions is not None:
-            return "Squats have no contacts and no strides. The overview lists every squat."
+            return "Squats have no contacts or strides. The overview lists all squats."
         return (
-            "This analysis was made by an earlier version, which did not keep what an edit is measured on. "
+            "This analysis was made by an earlier version that did not store the data needed for edits. "
             "Run the analysis again."
         )
 

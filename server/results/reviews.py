@@ -124,7 +124,7 @@ def _refuse_older(c: Connection, record: analyses.AnalysisRecord, history: EditH
 def _meanwhile() -> Conflict:
     return Conflict(
         "edited_meanwhile",
-        "Somebody else has changed this review since it was loaded; nothing was changed. Load it again.",
+        "Another user has changed this review since it was loaded; nothing was changed. Reload it.",
     )
 
 

@@ -134,7 +134,7 @@ def submit(
         the session, its analysis, or the reference. Conflict: not_squats.
     """
     if sessions.get(c, session_id).protocol != "squat":
-        raise Conflict("not_squats", "This is analysed for squats; the visit has another protocol.")
+        raise Conflict("not_squats", "This analysis is for squats; the visit has another protocol.")
     record = analyses.get_shown(c, session_id)
     against = None if reference is None else reference_files.get(c, session_id, reference)
     settings = {"reference": reference, "from_standing": from_standing}

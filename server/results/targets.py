@@ -107,14 +107,17 @@ def offer(walk: AnalysedWalk | None, source: TargetSource, parameter: str, side:
     if walk is None:
         return Offer(
             None,
-            "No walk of this person without feedback is analysed yet. Analyse one first, or enter a target.",
+            "No walk without feedback has been analysed for this person yet. Analyse one first, or enter "
+            "a target.",
         )
     if source == "norm":
         return _norm(walk, parameter)
     if source == "own_baseline":
         return _own(walk, parameter, side)
     if side is None:
-        return Offer(None, "Both sides are trained. Choose the one that is, the other is then the target.")
+        return Offer(
+            None, "Both sides are selected for training. Choose one side; the other is then the target."
+        )
     return _better(walk, parameter, side)
 
 

@@ -154,7 +154,9 @@ def submit(
     this = recordings.require_current(c, session_id)
     trials = {path.stem for f in this.files if (path := PurePosixPath(f.name)).suffix == TRIAL}
     if unknown := sorted(set(order.validation) - trials):
-        raise Conflict("no_such_trial", f"No trial “{'”, “'.join(unknown)}” among the session's files.")
+        raise Conflict(
+            "no_such_trial", f"There is no trial “{'”, “'.join(unknown)}” among the visit's files."
+        )
     params = {**recordings.job_inputs(this), "order": asdict(order)}
     view = queue.submit(
         c,

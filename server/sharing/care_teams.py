@@ -175,7 +175,9 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     care_teams_off, seen_already.
     """
     if not are_on(c):
-        raise Conflict("care_teams_off", "This clinic has no care teams: you see every patient in the list.")
+        raise Conflict(
+            "care_teams_off", "This clinic does not use care teams: all patients are in your list."
+        )
     text = " ".join(reason.split())
     if not REASON[0] <= len(text) <= REASON[1]:
         raise ServiceError(
@@ -188,7 +190,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     if patient_id is None:
         raise NotFound("patient", normalized)
     if may_open(c, user, {"patient_id": patient_id}):
-        raise Conflict("seen_already", "You may open this patient already; look in the list of patients.")
+        raise Conflict("seen_already", "You already have access to this patient; see the patient list.")
     time = now()
     row = {
         "id": new_id(),
@@ -253,7 +255,7 @@ def _select_accesses() -> Select[Any]:
 def _get_access(c: Connection, access_id: str) -> EmergencyAccess:
     row = c.execute(_select_accesses().where(emergency_access.c.id == access_id)).first()
     if row is None:
-        raise NotFound("access in an emergency", access_id)
+        raise NotFound("emergency access", access_id)
     return _make_access(row)
 
 

@@ -67,7 +67,7 @@ class LinkNotFound(ServiceError):  # noqa: N818 - as NotFound
     def __init__(self) -> None:
         super().__init__(
             "link_not_valid",
-            "This address leads to no report any more. Ask the clinic for a new one.",
+            "This link is no longer valid. Ask the clinic for a new one.",
         )
 
 
@@ -83,9 +83,9 @@ def make(
     """
     report = signed_reports.get(c, report_id)
     if not report.in_force:
-        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the one that is signed.")
+        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the signed version.")
     if not 1 <= days <= MOST_DAYS:
-        raise ServiceError("bad_value", f"A link lives {days} days, expected 1 to {MOST_DAYS}.")
+        raise ServiceError("bad_value", f"A link is valid for {days} days; expected 1 to {MOST_DAYS}.")
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
     patient_id = sessions.get(c, report.session_id).patient_id

@@ -159,7 +159,7 @@ def keep_signed(
     expected = prepare_signature(c, session_id, signature.report_id, signature.name)
     if expected.number != signature.number:
         raise Conflict(
-            "report_changed", "Somebody else has signed this report meanwhile. Load the page again."
+            "report_changed", "Another user has signed this report in the meantime. Reload the page."
         )
     c.execute(
         insert(signed_report).values(
@@ -184,7 +184,7 @@ def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str
     """Reopen a signed report, which remains readable. Raises NotFound, Conflict, bad_value."""
     report = get(c, report_id)
     if not report.in_force:
-        raise Conflict("not_in_force", f"Version {report.number} has been reopened already.")
+        raise Conflict("not_in_force", f"Version {report.number} has already been reopened.")
     text = reason.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
         raise ServiceError("bad_value", f"A reason has 1 to {MOST_CHARACTERS:,} characters.")

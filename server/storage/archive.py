@@ -66,7 +66,7 @@ def make_key(path: Path) -> str:
     exists.
     """
     if path.exists():
-        raise BackupFileError(f"{path} exists; a key is never written over another one.")
+        raise BackupFileError(f"{path} exists; an existing key is never overwritten.")
     private = pyrage.x25519.Identity.generate()
     public = str(private.to_public())
     fs.write_file(path, f"# public key: {public}\n{private}\n".encode())

@@ -79,8 +79,8 @@ class FieldKeys:
         if key is None:
             raise ValueUnreadable(
                 "identity_key_wrong",
-                f"The {say_field(name)} was encrypted by key {key_name.hex()}, which is not the one in its "
-                "place. The operator puts the right key file back.",
+                f"The {say_field(name)} was encrypted with key {key_name.hex()}, which is not the installed "
+                "one. The administrator must restore the right key file.",
             )
         try:
             return AESGCM(key).decrypt(nonce, sealed[_HEAD:], _bind(row_id, name)).rstrip(b"\0").decode()
@@ -94,7 +94,7 @@ class FieldKeys:
 def make_keys(path: Path) -> str:
     """Write a file with a new key, readable by its owner only; return its name; KeyUnusable if it exists."""
     if path.exists():
-        raise KeyUnusable("identity_key_exists", f"{path} exists; a key is never written over another one.")
+        raise KeyUnusable("identity_key_exists", f"{path} exists; an existing key is never overwritten.")
     key = os.urandom(32)
     _write(path, [key])
     return _name(key).hex()
@@ -118,23 +118,25 @@ def read_keys(path: Path) -> FieldKeys:
     except FileNotFoundError as error:
         raise KeyUnusable(
             "identity_key_missing",
-            "The key of patients' names is not in its place. The operator puts the file back.",
+            "The encryption key of patient names is missing. The administrator must restore the file.",
         ) from error
     except (OSError, UnicodeDecodeError) as error:
         raise KeyUnusable(
-            "identity_key_missing", "The key of patients' names cannot be read. The operator puts it right."
+            "identity_key_missing",
+            "The encryption key of patient names cannot be read. The administrator must repair it.",
         ) from error
     matches = [_LINE.fullmatch(line) for line in lines if line and not line.startswith("#")]
     keys = [bytes.fromhex(one[1]) for one in matches if one is not None]
     if not keys or len(keys) != len(matches):
         raise KeyUnusable(
             "identity_key_wrong",
-            "The file of the key of patients' names holds no such key. The operator puts the right one back.",
+            "The key file of patient names does not contain this key. The administrator must restore the "
+            "right one.",
         )
     return FieldKeys({_name(key): key for key in keys})
 
 
-_MEND: Final = "The operator runs `sagittal check`, and takes it from a backup or from paper."
+_MEND: Final = "The administrator should run `sagittal check` and restore it from a backup or from paper."
 
 
 def say_field(name: str) -> str:

@@ -153,7 +153,9 @@ def publish_inspection(
 ) -> None:
     """Store inspection results; raises Conflict files_changed if the set has changed meanwhile."""
     if get(c, recording_id).input_sha256 != input_sha256:
-        raise Conflict("files_changed", "Files were added or removed meanwhile; the new set is looked at.")
+        raise Conflict(
+            "files_changed", "Files were added or removed in the meantime; the new set is being checked."
+        )
     c.execute(update(recording).where(recording.c.id == recording_id).values(inspection=dict(result)))
 
 
@@ -161,7 +163,7 @@ def require_current(c: Connection, session_id: str) -> StoredRecording:
     """The current recording with at least one file; raises Conflict no_files."""
     this = current(c, session_id)
     if this is None or not this.files:
-        raise Conflict("no_files", "This session has no files yet; upload the recording first.")
+        raise Conflict("no_files", "This visit has no files yet; upload the recording first.")
     return this
 
 

@@ -60,7 +60,7 @@ class receive_reference(receive):  # noqa: N801 - as `receive`
         c.execute(delete(reference_file).filter_by(**key))
         mine = reference_file.c.session_id == self._session_id
         if c.execute(select(func.count()).select_from(reference_file).where(mine)).scalar_one() >= MOST_FILES:
-            raise TooLarge("too_many_files", f"A session has at most {MOST_FILES} references; remove one.")
+            raise TooLarge("too_many_files", f"A visit has at most {MOST_FILES} references; remove one.")
         c.execute(insert(reference_file).values(**key, size=blob.size, sha256=blob.sha256, added_at=now()))
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
         audit.record(c, self._actor, "reference.added", "session", self._session_id, detail)

@@ -137,7 +137,7 @@ def _fits(c: Connection, blobs: BlobStore, session_id: str, name: str, source: M
 
 
 def _check(file: SourceFile, source: Mapping[str, Any]) -> tuple[TableReading, ...]:
-    from sagittal.core.formats.draft import finish  # slow imports
+    from sagittal.core.formats.common_time import finish  # slow imports
     from sagittal.core.formats.manifest import manifest_of
     from sagittal.core.formats.table_guess import make_entry, read_sample
     from sagittal.core.quality.signals import measure_signal

@@ -73,7 +73,7 @@ def begin(
                 return one
             reserved += one.size
         if len(coming) >= settings.max_files:
-            raise TooLarge("too_many_files", f"At most {settings.max_files} files come at a time.")
+            raise TooLarge("too_many_files", f"At most {settings.max_files} files can be uploaded at a time.")
         receiving.check_set(c, settings, session_id, name, size + reserved)
         receiving.require_room(blobs, settings, size)
         fresh = new_id()
@@ -114,12 +114,12 @@ def add_part(
             this = get(c, blobs, session_id, upload_id)
         if offset != this.offset:
             raise Conflict(
-                "upload_gap", f"Bytes from {offset} came, expected those from {this.offset}. Send these."
+                "upload_gap", f"Received bytes from {offset}, expected bytes from {this.offset}. Send those."
             )
         if offset + len(data) > this.size:
             raise TooLarge(
                 "file_too_large",
-                f"'{this.name}' was announced with {this.size} bytes, more came. Begin anew.",
+                f"'{this.name}' was announced with {this.size} bytes but more arrived. Start over.",
             )
         if not data:
             return this
@@ -162,17 +162,17 @@ def finish(
         this, path = _describe(blobs, row), blobs.part(upload_id)
         if row.finished_sha256 is not None:
             raise Conflict(
-                "upload_damaged", "This upload was finished with another SHA-256. Begin a new one."
+                "upload_damaged", "This upload was completed with another SHA-256. Start a new one."
             )
         if this.offset < this.size:
             raise Conflict(
-                "upload_incomplete", f"{this.offset} of {this.size} bytes are here. Send the rest first."
+                "upload_incomplete", f"{this.offset} of {this.size} bytes received. Send the rest first."
             )
         if _hash(path) != sha256:
             fs.remove_file(path)
             raise Conflict(
                 "upload_damaged",
-                f"What came of '{this.name}' has another SHA-256 than what was sent. Send it again from 0.",
+                f"The SHA-256 of the received '{this.name}' differs from the sent one. Send it again from 0.",
             )
         with db.read() as c:
             space = recordings.patient_of(c, session_id)

@@ -58,7 +58,7 @@ def get(c: Connection, session_id: str) -> SessionVideo:
     sessions.get(c, session_id)
     video = find(c, session_id)
     if video is None:
-        raise NotFound("video of session", session_id)
+        raise NotFound("video of visit", session_id)
     return video
 
 
@@ -74,7 +74,9 @@ def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: f
     """Set the video time at trial time 0, None = unknown; raises NotFound, bad_value."""
     get(c, session_id)
     if offset_s is not None and not (isfinite(offset_s) and abs(offset_s) <= MOST_OFFSET_S):
-        raise ServiceError("bad_value", f"The offset is {offset_s} s, expected at most a day either way.")
+        raise ServiceError(
+            "bad_value", f"The offset is {offset_s} s; expected at most one day in either direction."
+        )
     c.execute(update(session_video).where(session_video.c.session_id == session_id).values(offset_s=offset_s))
     audit.record(c, actor, "video.aligned", "session", session_id, {"offset_s": offset_s})
     return get(c, session_id)
@@ -92,7 +94,8 @@ def require_consent(consent: bool) -> None:
     if not consent:
         raise ServiceError(
             "no_consent",
-            "A video is kept only of who agreed to be filmed. Ask, and say so with the upload.",
+            "A video is stored only with the person's consent. Obtain consent and confirm it with the "
+            "upload.",
         )
 
 
@@ -122,7 +125,8 @@ class receive_video(receive):  # noqa: N801 - as `receive`
         """Store the video; raises ServiceError no_video if browsers cannot play it."""
         if find_media_type(self._begins) is None:
             raise ServiceError(
-                "no_video", f"'{self._name}' is no video that browsers play. Expected MP4, QuickTime or WebM."
+                "no_video",
+                f"'{self._name}' is not a video that browsers can play. Expected MP4, QuickTime or WebM.",
             )
         return super().keep()
 

@@ -27,7 +27,7 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
     )
 
     page = opened(f"/sessions/{filled.done}/algorithms")
-    expect(page.get_by_text("No filter was compared on this take yet")).to_be_visible()
+    expect(page.get_by_text("No filters have been compared on this trial yet")).to_be_visible()
     file = FilePayload(name="optical.csv", mimeType="text/csv", buffer=text.getvalue().encode())
     with page.expect_navigation():
         page.locator("[data-file]").set_input_files(file)
@@ -39,15 +39,15 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
     for engine in page.locator("[data-engine]").all():
         engine.uncheck()
     expect(page.get_by_text("0 of 39 chosen")).to_be_visible()
-    page.get_by_role("button", name="Run on this take").click()
+    page.get_by_role("button", name="Run on this trial").click()
     expect(page.locator("filter-choice .form-error")).to_be_visible()
     page.get_by_label("Mahony2008").check()
     page.get_by_label("Hua2014").check()
     page.get_by_label("Martin2010").check()
-    page.get_by_label("Use the magnetometer where a filter can").uncheck()
+    page.get_by_label("Use the magnetometer in filters that support it").uncheck()
     page.get_by_label("Compare with a reference").select_option("optical.csv")
-    page.get_by_role("button", name="Run on this take").click()
-    expect(page.get_by_role("heading", name="In short")).to_be_visible(timeout=90_000)
+    page.get_by_role("button", name="Run on this trial").click()
+    expect(page.get_by_role("heading", name="Summary")).to_be_visible(timeout=90_000)
     expect(page.get_by_text(re.compile("Martin2010 needs a magnetometer"))).to_be_visible()
     expect(page.get_by_role("heading", name="Against the reference")).to_be_visible()
     expect(page.locator("circle.ba").first).to_be_attached()

@@ -49,9 +49,9 @@ def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
         page.wait_for_function("() => document.querySelector('[data-preview]').videoWidth > 0")
         card.get_by_role("button", name="Other camera").click()
         page.wait_for_function(f"() => {CAMERA}.stream?.active")
-        card.get_by_role("button", name="Hide the picture").click()
+        card.get_by_role("button", name="Hide camera picture").click()
         expect(card.locator("video")).to_be_hidden()
-        card.get_by_role("button", name="Show the picture").click()
+        card.get_by_role("button", name="Show camera picture").click()
         choose(page, walk_files())
         place(page, SEGMENTS)
         assert not layout_faults(page) | text_faults(page)
@@ -89,7 +89,7 @@ def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
             "return Math.abs(v.currentTime - t) < 0.05 && !v.seeking && v.readyState >= 2; }",
             arg=t + video["offset_s"],
         )
-    expect(player.get_by_role("button", name="Align again")).to_be_visible()
+    expect(player.get_by_role("button", name="Realign")).to_be_visible()
 
 
 def kept_video(clinic: Clinic) -> dict[str, Any]:

@@ -72,12 +72,12 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
         start(page)
         expect(page.locator("[data-say]")).to_have_text("Stand still")
         # what to do follows the server's calibration
-        expect(page.locator("[data-say]")).to_have_text("Walk straight on", timeout=15_000)
+        expect(page.locator("[data-say]")).to_have_text("Walk straight ahead", timeout=15_000)
         assert clinic.take()["state"] == "streaming"
 
         network.cut()
         page.wait_for_timeout(1500)
-        expect(page.locator("[data-link]")).to_contain_text(re.compile(r"Keeping \d\.\d s here"))
+        expect(page.locator("[data-link]")).to_contain_text(re.compile("Storing \\d\\.\\d s here"))
         page.wait_for_timeout(3500)
         # recording goes on without the network
         until(page, "page.outbox.made - page.outbox.acked > 80", 5)
@@ -245,11 +245,11 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
         network.mend()
         expect(page.get_by_role("alert")).to_contain_text("ended on the clinic's screen", timeout=15_000)
         page.reload()
-        expect(page.locator("[data-go]")).to_have_text("Save or delete what is left", timeout=10_000)
-        expect(page.get_by_role("button", name="Save what is left")).to_be_visible()
+        expect(page.locator("[data-go]")).to_have_text("Save or delete the remaining data", timeout=10_000)
+        expect(page.get_by_role("button", name="Save remaining data")).to_be_visible()
         acknowledged = page.evaluate("() => document.querySelector('capture-page').outbox.acked")
         with page.expect_download() as saving:
-            page.get_by_role("button", name="Save what is left").click()
+            page.get_by_role("button", name="Save remaining data").click()
         rest = saving.value.path().read_bytes()
         page.get_by_role("button", name="Delete it").first.click()
         page.locator("dialog[open]").get_by_role("button", name="Delete it").click()

@@ -162,7 +162,7 @@ def test_a_device_without_motion_is_not_asked_to_be_turned(
     with tablet(flat, running) as page:
         pair(page, clinic.code)
         page.get_by_role("button", name="This device itself").click()
-        expect(page.locator("[data-axes-say]")).to_have_text("This device sends no motion")
+        expect(page.locator("[data-axes-say]")).to_have_text("This device sends no motion data")
         expect(page.locator("[data-go]")).to_be_disabled()
 
 
@@ -177,7 +177,7 @@ def test_the_device_itself_is_a_sensor_after_its_self_test(
         expect(page.locator("[data-axes-say]")).to_have_text("1 of 4: Lay the device flat, screen up")
         expect(page.locator("[data-go]")).to_be_disabled()
         page.evaluate(MOVE, turning)
-        expect(page.locator("[data-axes-say]")).to_have_text("The axes of this device are checked")
+        expect(page.locator("[data-axes-say]")).to_have_text("Axes of this device checked")
         page.locator("li[data-sensor] [data-place]").click()
         page.locator("dialog[open] button[value=pelvis]").click()
         page.evaluate("(rows) => { (%s)(rows); }" % MOVE, lying)  # noqa: UP031
@@ -224,7 +224,7 @@ def test_a_new_code_goes_on_with_the_take_of_a_tablet_that_was_sent_away(
         again = clinic.post("/live/code")["code"]
         page.evaluate("() => { document.querySelector('capture-page').outbox.record.token = 'gone'; }")
         page.evaluate("() => document.querySelector('capture-page').link.socket.close()")
-        expect(page.get_by_role("alert")).to_contain_text("The pairing is over", timeout=10_000)
+        expect(page.get_by_role("alert")).to_contain_text("The pairing has ended", timeout=10_000)
         made = page.evaluate("() => document.querySelector('capture-page').outbox.made")
         page.wait_for_timeout(1000)
         until(page, f"page.outbox.made > {made} + 10", 5)

@@ -36,7 +36,7 @@ def test_an_upload_is_five_clicks_from_its_overview(opened: Opener, running: Run
     hand.click(page.locator(f"[data-sides={answer}]"))
     hand.click(page.locator("[data-analyse]"))
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
-    expect(page.locator("h2", has_text="Values that matter")).to_be_visible(timeout=180_000)
+    expect(page.locator("h2", has_text="Key values")).to_be_visible(timeout=180_000)
     assert hand.clicks <= 5
 
 
@@ -71,7 +71,7 @@ def test_a_stride_is_left_out_by_two_clicks(opened: Opener, running: RunningServ
         pick_counted(page)
         hand.clicks += 1  # that is at a place between two handles
         hand.click(page.get_by_role("button", name="Turn or obstacle"))
-        expect(page.locator("[data-verdict]")).to_have_text("left out")
+        expect(page.locator("[data-verdict]")).to_have_text("excluded")
         assert hand.clicks <= 2
     finally:
         with running.client() as client:
@@ -90,7 +90,7 @@ def test_a_live_recording_with_known_sensors_starts_by_ten_clicks(
     for is_known in (False, True):
         hand = Hand()
         page.goto(f"/patients/{patient}")
-        hand.click(page.get_by_role("link", name="New session").first)
+        hand.click(page.get_by_role("link", name="New visit").first)
         page.wait_for_url(re.compile(r"/sessions/new$"))  # loaded: its script is there
         hand.click(page.get_by_role("button", name="Record live"))
         page.wait_for_url(re.compile(r"/live$"))
@@ -147,7 +147,7 @@ def test_an_unknown_table_is_eight_clicks_from_its_analysis(
     expect(columns.locator("[data-check=ok]").first).to_contain_text("Hz", timeout=20_000)
     assert columns.locator("[data-check]:not([data-check=ok])").count() == 0
     assert axe_faults(page) == []
-    hand.click(columns.get_by_role("button", name="Read the files so"))
+    hand.click(columns.get_by_role("button", name="Use these columns"))
     expect(page.locator("sensor-map")).to_be_visible(timeout=180_000)
     expect(page.locator("[data-sum]")).not_to_be_empty()
     answer = page.locator("[data-sides=keep]")

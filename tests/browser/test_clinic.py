@@ -121,7 +121,7 @@ def test_a_waiting_job_is_shown_live_and_can_be_cancelled(
         page.get_by_role("button", name="Analyse").click()
         card = page.locator("job-progress.card")
         expect(card).to_contain_text("Waiting for the worker")
-        expect(card).to_contain_text("Find contacts and strides")
+        expect(card).to_contain_text("Detect contacts and strides")
         expect(card).to_contain_text("You can close this page")
         expect(page.locator(".rail .count")).to_have_text("1")
         card.get_by_role("button", name="Cancel").click()
@@ -144,7 +144,7 @@ def test_a_take_without_strides_says_why_and_offers_the_mapping(opened: Opener, 
 
 def test_an_unknown_page_is_a_page_with_a_way_back(opened: Opener) -> None:
     page = opened("/sessions/00000000000000000000000000000000", stays=True)
-    expect(page.locator("h1")).to_have_text("Nothing here")
+    expect(page.locator("h1")).to_have_text("Page not found")
     page.get_by_role("link", name="Patients").click()
     page.wait_for_url(re.compile(r":\d+/patients$"))
 

@@ -56,8 +56,8 @@ def test_the_page_of_daily_life_shows_what_was_lived(opened: Opener, lived: tupl
     assert int(row.get_by_role("cell").nth(1).inner_text()) == pytest.approx(147, abs=8)
     for more in (
         "Every hour as a table",
-        "What each word means",
-        "Each of them, with leans that do not count",
+        "Glossary",
+        "All transitions, including rejected trunk leans",
     ):
         page.get_by_text(more).click()
     faults = all_faults(page)

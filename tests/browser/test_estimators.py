@@ -39,21 +39,21 @@ def test_the_overview_names_the_estimator_and_leads_to_its_health(opened: Opener
     quality.get_by_role("link", name="ErKF, smoothed").click()
     page.wait_for_url(re.compile(r"/data$"))
     health = page.locator("table", has_text="Self-check")
-    expect(health).to_contain_text("Joint ends apart")
+    expect(health).to_contain_text("Joint separation")
     expect(health.locator("tbody tr")).not_to_have_count(0)
 
 
 def test_another_estimator_runs_and_its_angles_are_marked(opened: Opener, walk: str) -> None:
     page = opened(f"/sessions/{walk}/data", stays=True)
-    page.get_by_label("Another estimator on this take").select_option("l7s_3i")
+    page.get_by_label("Run another estimator on this trial").select_option("l7s_3i")
     page.get_by_role("button", name="Run it").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
     expect(page.locator(".quality")).to_contain_text("L7S-3I", timeout=60_000)
     expect(find_row(page, "Knee flexion range")).to_contain_text("low confidence")
     page.goto(f"/sessions/{walk}/data")
     expect(page.get_by_role("heading", name="Earlier analyses")).to_be_visible()
-    page.get_by_label("Another estimator on this take").select_option(
-        label="Automatic: the best for what is worn"
+    page.get_by_label("Run another estimator on this trial").select_option(
+        label="Automatic: best for the sensors in use"
     )
     page.get_by_role("button", name="Run it").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")

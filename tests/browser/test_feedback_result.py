@@ -72,7 +72,7 @@ def test_a_session_shows_its_strides_with_and_without_feedback(opened: Opener, t
     assert section.locator("circle.fb-on").count() == strides + 1, "each stride, and the legend"
     expect(section).to_contain_text("Probe block")
     expect(section).to_contain_text("Sagittal profile score")
-    page.get_by_text("What was prescribed").click()
+    page.get_by_text("Prescription").click()
     faults = all_faults(page)
     assert not faults, "\n".join(faults)
 

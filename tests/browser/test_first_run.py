@@ -23,10 +23,10 @@ def test_the_printed_address_makes_the_first_administrator_once(flat: Browser, t
         assert not layout_faults(page) | text_faults(page)
         page.get_by_label("User name").fill("maria")
         page.get_by_label("Password", exact=True).fill(PASSWORD)
-        page.get_by_label("Password again").fill("another sentence")
+        page.get_by_label("Repeat password").fill("another sentence")
         page.get_by_role("button", name="Create account").click()
         assert page.locator("input:invalid").count() == 1, "two different passwords must not pass"
-        page.get_by_label("Password again").fill(PASSWORD)
+        page.get_by_label("Repeat password").fill(PASSWORD)
         page.get_by_role("button", name="Create account").click()
         page.wait_for_url(re.compile(r":\d+/patients$"))
         expect(page.locator(".empty")).to_contain_text("No patients yet")

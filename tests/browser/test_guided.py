@@ -82,8 +82,8 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
 
         # a person corrects the start by half a second
         test.get_by_text("Correct start and end").click()
-        start = float(test.get_by_label("Starts at, seconds").input_value())
-        test.get_by_label("Starts at, seconds").fill(f"{start - 0.5:.2f}")
+        start = float(test.get_by_label("Start, seconds").input_value())
+        test.get_by_label("Start, seconds").fill(f"{start - 0.5:.2f}")
         test.get_by_role("button", name="Measure again").click()
         expect(test.locator("[data-total-note]")).to_contain_text("set by hand")
         assert float(test.locator("[data-total]").inner_text()) == pytest.approx(true_s + 0.5, abs=0.15)
@@ -98,7 +98,7 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
 
         # on the session page the same correction is made again, by its form
         card.get_by_text("Correct start and end").click()
-        card.get_by_label("Test begins at, seconds").fill(f"{start - 1.0:.2f}")
+        card.get_by_label("Test start, seconds").fill(f"{start - 1.0:.2f}")
         card.get_by_role("button", name="Measure again").click()
         expect(card.locator(".kpi .v").first).to_contain_text(f"{total + 0.5:.1f}", timeout=90_000)
         with running.client() as client:

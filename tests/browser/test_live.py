@@ -139,8 +139,8 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
 
     # the end: saved, analysed, opened
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=60_000)
-    assert set(seen["over"]) <= {"Recording is saved"}  # it may be analysed before anybody could read that
-    expect(page.get_by_role("heading", name="Values that matter")).to_be_visible(timeout=30_000)
+    assert set(seen["over"]) <= {"Recording saved"}  # it may be analysed before anybody could read that
+    expect(page.get_by_role("heading", name="Key values")).to_be_visible(timeout=30_000)
     with running.client() as client:
         session = page.url.rsplit("/", 1)[1]
         take = client.get(f"/api/v1/sessions/{session}/live").json()

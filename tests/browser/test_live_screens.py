@@ -528,11 +528,11 @@ def test_a_test_whose_estimate_has_ended_shows_no_running_clock_and_nothing_to_b
     }  # fmt: skip
     this.say(feed.state(), json.dumps(json.loads(feed.frame(4.0)) | {"test": begun}))
     expect(test.locator("[data-phase]").first).to_have_text("Running")
-    expect(test.get_by_role("button", name="Begin again")).to_be_visible()
+    expect(test.get_by_role("button", name="Start over")).to_be_visible()
     this.say(feed.state(estimate="failed"))
     expect(test.locator("[data-phase]").first).to_have_text("Live view stopped")
     expect(test.locator("[data-say]")).to_contain_text("measured afterwards")
-    expect(test.get_by_role("button", name="Begin again")).to_be_hidden()
+    expect(test.get_by_role("button", name="Start over")).to_be_hidden()
     expect(test.locator("[data-clock]")).to_have_css("text-decoration-line", "line-through")
     shown = test.locator("[data-clock]").inner_text()
     expect(page.locator("[data-note=estimate]")).to_contain_text("The live view has stopped.")

@@ -22,7 +22,7 @@ def test_a_number_opens_to_its_strides_and_a_stride_to_its_moment(opened: Opener
     assert all(0.9 < value < 1.3 for value in counted)
     marks = page.locator(".chart.behind circle")
     assert marks.count() == rows.count()
-    page.get_by_role("link", name="Signals and figure").nth(10).click()
+    page.get_by_role("link", name="Signals and avatar").nth(10).click()
     page.wait_for_url(re.compile(r"/timeline#t=\d+\.\d+$"))
     expect(page.locator("[data-stride-box]")).to_contain_text("Contact")
 
@@ -34,7 +34,7 @@ def test_a_value_is_found_by_its_name_among_all_folds(opened: Opener, filled: Fi
     expect(found.first).to_be_visible()
     assert all("toe clearance" in row.lower() for row in found.all_inner_texts())
     page.get_by_label("Find a value").fill("wingspan")
-    expect(page.get_by_text("No value has this in its name.")).to_be_visible()
+    expect(page.get_by_text("No matching value.")).to_be_visible()
     expect(found).to_have_count(0)
     page.get_by_label("Find a value").fill("")
     expect(page.locator("all-values summary").first).to_be_visible()

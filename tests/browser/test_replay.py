@@ -48,7 +48,7 @@ def figure(figure_page: Page) -> Iterator[Page]:
     switched = figure_page.locator("[data-switch][aria-pressed=false]")
     while switched.count():
         switched.first.click()
-    figure_page.get_by_label("Look from").select_option("near")
+    figure_page.get_by_label("View from").select_option("near")
     if figure_page.locator("html[data-theme=dark]").count():
         figure_page.locator(".rail [data-theme-toggle]").click()
     _seek(figure_page, 0)
@@ -193,7 +193,7 @@ def test_the_figure_is_looked_at_from_every_side(figure: Page) -> None:
     _seek(figure, 12)
     seen = [wait_until_still(figure)]
     for view in ("right", "front", "top"):
-        figure.get_by_label("Look from").select_option(view)
+        figure.get_by_label("View from").select_option(view)
         wait_for_picture(figure, lambda now: now != seen[-1])
         seen.append(wait_until_still(figure))
     assert [x for x in seen if not 0.3 < x["x"] < 0.7] == []

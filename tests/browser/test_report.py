@@ -13,16 +13,16 @@ from tests.browser.design import layout_faults, text_faults
 def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.done}/print")
     page.get_by_role("link", name="Sign, share").click()
-    page.get_by_label("Assessment of the therapist").last.fill("Longer steps.\n\nPlan: go on.")
-    page.get_by_role("button", name="Save the text").click()
+    page.get_by_label("Therapist's assessment").last.fill("Longer steps.\n\nPlan: go on.")
+    page.get_by_role("button", name="Save assessment").click()
     expect(page.get_by_role("status").filter(has_text="Saved")).to_be_visible()
     page.get_by_role("button", name="Sign", exact=True).click()
     with page.expect_navigation():
         page.get_by_role("button", name="Sign and lock").click()
     expect(page.get_by_text("Version 1 is signed and locked")).to_be_visible()
-    expect(page.get_by_role("button", name="Save the text")).to_have_count(0)
+    expect(page.get_by_role("button", name="Save assessment")).to_have_count(0)
     page.get_by_role("button", name="Share").click()
-    page.get_by_role("button", name="Make the link").click()
+    page.get_by_role("button", name="Create link").click()
     slip = page.locator("#slip")
     expect(slip.get_by_role("img", name="QR code of the address")).to_be_visible()
     assert slip.locator("img").evaluate("i => i.complete && i.naturalWidth > 0")
@@ -50,7 +50,7 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     page.get_by_label("Why").fill("Typing error")
     with page.expect_navigation():
         page.get_by_role("dialog").get_by_role("button", name="Reopen").click()
-    expect(page.get_by_role("button", name="Save the text")).to_be_visible()
+    expect(page.get_by_role("button", name="Save assessment")).to_be_visible()
 
 
 @pytest.mark.parametrize("width", [1280, 360])
@@ -59,7 +59,7 @@ def test_an_assessment_that_does_not_fit_is_neither_cut_nor_saved(
 ) -> None:
     page = opened(f"/sessions/{filled.earlier}/report", width=width)
     text = page.locator("#f-content")
-    room, save = page.locator("[data-left]").first, page.get_by_role("button", name="Save the text")
+    room, save = page.locator("[data-left]").first, page.get_by_role("button", name="Save assessment")
     saved = page.locator("[data-saved]")
     sent: list[str] = []
     page.on("request", lambda r: sent.append(r.url) if r.method == "PUT" else None)

@@ -32,7 +32,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
 
         sign_in()
         page.wait_for_url(f"{here}/account")  # loaded, with its scripts
-        page.get_by_label("Present password").nth(1).fill(PASSWORD)
+        page.get_by_label("Current password").nth(1).fill(PASSWORD)
         page.get_by_role("button", name="Set up a second factor").click()
         dialog = page.locator("dialog[open]")
         secret = dialog.locator("[data-answer=secret]").inner_text()
@@ -44,7 +44,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
 
         page.get_by_role("button", name="New key").click()
         dialog.get_by_label("Name").fill("Blue key")
-        dialog.get_by_label("Present password").fill(PASSWORD)
+        dialog.get_by_label("Current password").fill(PASSWORD)
         dialog.get_by_label("One-time code").fill(codes[0])
         dialog.get_by_role("button", name="Set up").click()
         keys = page.locator("section", has=page.locator("#h-keys"))
@@ -65,7 +65,7 @@ def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: Running
         session.send("WebAuthn.addVirtualAuthenticator", {"options": options})
         sign_in()
         page.get_by_role("button", name="Use a security key").click()
-        expect(page.locator(".form-error")).to_contain_text("The key gave no answer")
+        expect(page.locator(".form-error")).to_contain_text("The key did not respond")
         assert "/sign-in" in page.url
     finally:
         context.close()

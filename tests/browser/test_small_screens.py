@@ -25,7 +25,7 @@ def test_edit_delete_and_the_note_are_there_in_every_size(
 ) -> None:
     width, height = size
     page = opened(f"/sessions/{filled.done}", width=width, height=height, stays=True)
-    for name in ("Delete session", "Edit session"):
+    for name in ("Delete visit", "Edit visit"):
         button = page.get_by_role("button", name=name)
         expect(button).to_be_visible()
         box = button.bounding_box()
@@ -50,7 +50,7 @@ def test_forms_in_cards_keep_their_distance_from_the_edge(
     width, height = size
     for path, label in (
         (f"/patients/{filled.patient}/sessions/new", "Name of the visit"),
-        ("/account", "New password again"),
+        ("/account", "Repeat new password"),
     ):
         page = opened(path, width=width, height=height, stays=True)
         field = page.get_by_label(label)

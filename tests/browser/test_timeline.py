@@ -80,7 +80,7 @@ def pick_counted(page: Page) -> Locator:
     """A counted left stride in view, picked by a click."""
     mark = page.locator("[data-side=left] g[data-stride]:not(:has(.x))").nth(1)
     click_stride(mark)
-    expect(page.locator("[data-verdict]")).to_have_text("counts")
+    expect(page.locator("[data-verdict]")).to_have_text("included")
     return mark
 
 
@@ -128,7 +128,7 @@ def test_numbers_that_do_not_come_stay_pale_and_it_is_said(timeline: Page) -> No
     timeline.route("**/timeline/numbers", lambda route: route.abort())
     drag(timeline, handle(timeline, "tc"), 20)
     done(timeline, "left foot-off moved")
-    expect(timeline.locator("[data-problem]")).to_contain_text("The numbers could not be loaded")
+    expect(timeline.locator("[data-problem]")).to_contain_text("The values could not be loaded")
     expect(timeline.locator("#numbers")).to_have_css("opacity", "0.4")
     timeline.unroute("**/timeline/numbers")
 
@@ -183,7 +183,7 @@ def test_arrow_keys_nudge_by_a_sample_and_several_presses_are_one_change(
     assert edit["to_s"] == pytest.approx(was + 0.03, abs=0.002)
     # the focus is still on the event that was moved
     label = timeline.evaluate("document.activeElement.ariaValueText")
-    assert label.endswith("placed by hand")
+    assert label.endswith("placed manually")
     timeline.keyboard.press("ArrowLeft")
     timeline.keyboard.press("Escape")
     timeline.wait_for_timeout(1200)
@@ -318,11 +318,11 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     click_stride(pick_counted(timeline))
     dialog = timeline.locator("dialog[open]")
     dialog.locator("#words").fill("looked at the dog")
-    dialog.get_by_role("button", name="Leave it out").click()
-    done(timeline, "left out")
+    dialog.get_by_role("button", name="Exclude").click()
+    done(timeline, "excluded")
     used = int(words.split()[0])
     expect(timeline.locator("[data-counts=left]")).to_have_text(words.replace(str(used), str(used - 1), 1))
-    expect(timeline.locator("[data-verdict]")).to_have_text("left out")
+    expect(timeline.locator("[data-verdict]")).to_have_text("excluded")
     row = timeline.locator("[data-list] tr.on")
     expect(row).to_contain_text("no: looked at the dog")
     # kept by its middle, named by its contact as in the list
@@ -331,10 +331,10 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     overview = opened(f"/sessions/{walked}")
     expect(overview.locator("#warnings")).to_contain_text("1 stride left out")
     timeline.locator("[data-count]").click()
-    done(timeline, "counts")
+    done(timeline, "included")
     # the stride is picked: a second click, on why, leaves it out
     timeline.get_by_role("button", name="Turn or obstacle").click()
-    done(timeline, "left out")
+    done(timeline, "excluded")
     expect(timeline.locator("[data-list] tr.on")).to_contain_text("no: Turn or obstacle")
     timeline.locator("[data-undo]").click()
     done(timeline, "undone")
@@ -443,7 +443,7 @@ def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(
 ) -> None:
     page = opened(f"/sessions/{walked}/timeline#t=20", browser=solid)
     expect(page.locator("gait-view")).to_have_count(0)
-    page.get_by_role("button", name="Show the figure").click()
+    page.get_by_role("button", name="Show the avatar").click()
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.locator("[data-side=left] .ev.ic").first.focus()
     at = float(page.evaluate("document.activeElement.ariaValueNow"))
@@ -497,7 +497,7 @@ def test_a_drag_on_a_lane_moves_all_of_them_and_picks_nothing(timeline: Page) ->
 @pytest.mark.parametrize("width", [1280, 360])
 def test_the_dialogs_obey_the_design_system(opened: Opener, walked: str, width: int) -> None:
     page = opened(f"/sessions/{walked}/timeline", width=width, height=760, stays=True)
-    expect(page.locator("[data-verdict]")).to_have_text("counts")
+    expect(page.locator("[data-verdict]")).to_have_text("included")
     for button in ("[data-add]", "[data-out]"):
         page.locator(button).click()
         found = layout_faults(page) | text_faults(page)

@@ -55,7 +55,7 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     _map_sensors(page)
     page.locator("[data-analyse]").click()
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
-    expect(page.locator("h2", has_text="Values that matter")).to_be_visible(timeout=120_000)
+    expect(page.locator("h2", has_text="Key values")).to_be_visible(timeout=120_000)
 
     session = page.url
     _has_figures(page)
@@ -77,7 +77,7 @@ def test_a_table_without_a_time_asks_for_it_in_words(opened: Opener, running: Ru
         client.put(f"/api/v1/sessions/{session}/files/{table.name}", content=data).raise_for_status()
     page = opened(f"/sessions/{session}/upload")
     said = page.locator("[data-check=bad]")
-    expect(said).to_have_text("Enter the samples per second, or say which column is the time.")
+    expect(said).to_have_text("Enter the sampling rate or select the time column.")
     page.locator("[data-rate]").fill("204.8")
     expect(said).to_have_count(0)
     expect(page.locator("[data-check]")).to_have_count(2)
@@ -92,8 +92,8 @@ def test_a_visit_of_wrong_files_is_deleted_where_it_is_said(opened: Opener, runn
         {"name": "notes.txt", "mimeType": "text/plain", "buffer": b"Walked well.\n"}
     )
     expect(page.get_by_text("These files could not be read")).to_be_visible(timeout=60_000)
-    page.get_by_role("button", name="Delete session").click()
-    page.locator("dialog[open]").get_by_role("button", name="Delete session").click()
+    page.get_by_role("button", name="Delete visit").click()
+    page.locator("dialog[open]").get_by_role("button", name="Delete visit").click()
     page.wait_for_url(f"**/patients/{patient}")
     with running.client() as client:
         assert client.get(f"/api/v1/sessions/{session}").status_code == 404
@@ -178,10 +178,10 @@ def _new_session(page: Page) -> None:
     page.get_by_role("button", name="New patient").first.click()
     dialog = page.locator("dialog[open]")
     dialog.get_by_label("Code").fill("NEURA-S02")
-    dialog.get_by_label("Body height in metres").fill("1.75")
+    dialog.get_by_label("Height in metres").fill("1.75")
     dialog.get_by_role("button", name="Add patient").click()
     page.wait_for_url(re.compile(r"/patients/[0-9a-f]{32}$"))
-    page.get_by_role("link", name="New session").first.click()
+    page.get_by_role("link", name="New visit").first.click()
     page.wait_for_url("**/sessions/new")  # loaded: its script is there
     page.get_by_role("button", name="Upload a recording").click()
     page.wait_for_url("**/upload")
@@ -206,7 +206,7 @@ def _map_sensors(page: Page) -> None:
 def _has_figures(page: Page) -> None:
     page.get_by_role("link", name="How it was measured").click()
     quality = page.locator(".quality").inner_text()
-    assert "Strides used" in quality
+    assert "Strides included" in quality
     page.locator("summary", has_text="Timing").click()
     stride_time = page.locator(".params tr", has_text="Stride time").first.inner_text()
     assert page.locator(".params tbody tr:not(.group)").count() >= 15
@@ -273,7 +273,7 @@ def test_a_file_that_breaks_off_can_be_tried_again(
     page.locator("[data-files]").set_input_files([str(tmp_path / name) for name in files])
     broken = page.locator("[data-sending] li.bad")
     expect(broken).to_contain_text("The connection broke")
-    expect(page.get_by_role("button", name="Go on without them")).to_be_visible()
+    expect(page.get_by_role("button", name="Continue without them")).to_be_visible()
     page.get_by_role("button", name="Try two.txt again").click()
     # both are there: the server looks into them and the page shows what it thinks of them
     expect(page.locator("details .files li")).to_have_count(2, timeout=30_000)
@@ -343,12 +343,12 @@ def test_two_columns_cannot_both_be_the_time(opened: Opener, running: RunningSer
     page.locator("[data-files]").set_input_files(file)
     columns = page.locator("column-map")
     expect(columns.locator("[data-check=bad]")).to_contain_text("which column is the time", timeout=60_000)
-    columns.get_by_label("What column X [s]#1 is").select_option("time")
+    columns.get_by_label("Meaning of column X [s]#1").select_option("time")
     expect(columns.locator("[data-check=bad]")).to_have_count(0, timeout=20_000)
-    columns.get_by_label("What column X [s]#3 is").select_option("time")
+    columns.get_by_label("Meaning of column X [s]#3").select_option("time")
     expect(columns.locator("[data-check=bad]")).to_have_text(
-        "Time: chosen for the columns X [s]#1 and X [s]#3. Choose one of them."
+        "Time is assigned to columns X [s]#1 and X [s]#3. Choose one of them."
     )
-    expect(columns.get_by_role("button", name="Read the files so")).to_be_disabled()
-    columns.get_by_label("What column X [s]#1 is").select_option("")
-    expect(columns.get_by_role("button", name="Read the files so")).to_be_enabled(timeout=20_000)
+    expect(columns.get_by_role("button", name="Use these columns")).to_be_disabled()
+    columns.get_by_label("Meaning of column X [s]#1").select_option("")
+    expect(columns.get_by_role("button", name="Use these columns")).to_be_enabled(timeout=20_000)

@@ -22,8 +22,8 @@ from sagittal.web.template_texts import list_texts, reads_like_text
 from tests.data import ROOT
 
 SAID: Final = re.compile(
-    r"^(Notice|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
-    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable|Message)$"
+    r"^(Notice|Repair|_notify|_refuse|Problem|Offer|SignalError|CalibrationError|EstimationError"
+    r"|ServiceError|NotFound|NotAllowed|Conflict|TooLarge|__init__|KeyUnusable|ValueUnreadable)$"
 )
 """Classes, and what makes them, whose arguments pages show, wherever they are made."""
 
@@ -89,7 +89,7 @@ WORDS: Final = frozenset(
     re.findall(
         r"\S+",
         """
-    reduced increased shortened prolonged
+    corrected reduced increased shortened prolonged
     above acceleration active admin affected after ago anatomical and ankle assessment assessments
     assistant away back bad bar barefoot bars baseline before below both bouts cane centimetres changed
     chest children clinician complementary consistent copies copy crutch days degrees directions down
@@ -131,13 +131,13 @@ PHRASES: Final = (
     "mean − 2 SD, {source}",
     "left {left}, right {right}",
     "{side} not measured: {why}",
-    "{side} withheld: {why}",
+    "{side} not reported: {why}",
     "{side} not measured by two sensors",
     "{side} not measured",
     "{name} left",
     "{name} right",
     "{side} stride, {start_s} to {end_s} s",
-    "{side} stride, {start_s} to {end_s} s, left out: {why}",
+    "{side} stride, {start_s} to {end_s} s, excluded: {why}",
     "knee-ankle-foot orthosis",
     "{value} % lost",
     "Change (noun)",
@@ -149,15 +149,15 @@ PHRASES: Final = (
     "F, {age} y",
     "{age} y",
     (
-        "Norm: healthy adults asked to walk at this speed ({at}), overground, mean ± 1 SD ({source})."
-        " They are not people who are slow from habit or age."
+        "Norm: healthy adults asked to walk at this speed ({at}), overground, mean ± 1 SD ({source}). "
+        "These people were asked to walk at this speed; they do not habitually walk slowly."
     ),
     "Comfortable: {who}, overground at their comfortable 1.25 ± 0.16 m/s, mean ± 1 SD ({source}).",
     "left, mean of {left}, right, mean of {right} {what}",
-    "1 cue, left out, has no stride in the analysis.",
-    "{value} cues, left out, have no stride in the analysis.",
-    "1 cue, left out, has a stride that does not count in the analysis.",
-    "{value} cues, left out, have a stride that does not count in the analysis.",
+    "1 cue was excluded because it has no stride in the analysis.",
+    "{value} cues were excluded because they have no stride in the analysis.",
+    "1 cue was excluded because its stride is excluded from the analysis.",
+    "{value} cues were excluded because their strides are excluded from the analysis.",
 )
 """What pages put together from parts, as a whole."""
 
@@ -171,7 +171,7 @@ NOT_WORDS: Final = re.compile(
 
 SENTENCE: Final = re.compile(r"(?=(\S+ ){3})[A-Z{“].*\.$", re.DOTALL)
 
-UNMEASURED: Final = ("not measured: ", "withheld: ")
+UNMEASURED: Final = ("not measured: ", "not reported: ")
 """How a reason begins; in lists and beside a side's name it stands without."""
 
 _CODE: Final = frozenset(

@@ -12,7 +12,7 @@ from pathlib import Path
 from tests.data import ROOT
 
 ALLOWED_IN_CORE = {"numpy", "scipy", "numba", "sagittal"}
-ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py"}
+ALLOWED_IN_FORMATS = ALLOWED_IN_CORE | {"pyarrow", "defusedxml", "h5py", "openpyxl"}
 DATED = (
     "core/signals/sample_blocks.py",
     "core/activity/result.py",

@@ -11,7 +11,7 @@ import pytest
 
 from sagittal.core.message import PLACEHOLDER, Message, join_messages
 from sagittal.core.user_text import UserText
-from sagittal.web.language import LANGUAGES, SOURCE, Catalogue, load_catalogue
+from sagittal.web.language import LANGUAGES, SOURCE, Catalogue, load_catalogue, read_earlier
 from sagittal.web.stored_sentences import SentenceFinder
 from tests.data import ROOT
 from tests.helpers.texts import STAYS_ENGLISH, messages_of
@@ -111,3 +111,20 @@ def test_a_lookup_is_fast(language: str) -> None:
     catalogue.translate(message)
     best = min(timeit.repeat(lambda: catalogue.translate(message), number=200, repeat=5)) / 200
     assert 1e6 * best < SLOWEST_US
+
+
+@pytest.mark.parametrize(
+    ("stored", "translation"),
+    [
+        ("shank_l has no data in 56 % of the take.", "shank_l hat in 56 % der Aufnahme keine Daten."),
+        ("withheld: nobody can walk like this", "zurückgehalten: so kann niemand gehen"),
+    ],
+)
+def test_sentences_of_earlier_versions_are_still_translated(stored: str, translation: str) -> None:
+    assert load_catalogue("de").translate(stored) == translation
+
+
+def test_earlier_wordings_lead_to_messages_of_today() -> None:
+    earlier, messages = read_earlier(), load_catalogue("de").messages
+    assert [new for new in earlier.values() if new not in messages] == []
+    assert [old for old in earlier if old in messages] == []

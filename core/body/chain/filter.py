@@ -154,13 +154,13 @@ class ChainFilter:
                 ),
             )
         if not (np.isfinite(gyr[known]).all() and np.isfinite(acc[known]).all()):
-            raise EstimationError("filter_diverged", "A sample is no number; mark it as not valid.")
+            raise EstimationError("filter_diverged", "A sample is not a number; mark it as invalid.")
         out = np.empty((shape[0], len(self._x), 3))
         broken = filter_chain(self._arrays, self._noise, self._x, self._P, gyr, acc, known, out)
         if broken >= 0:
             raise EstimationError(
                 "filter_diverged",
-                "The chain's filter lost its way; check which segment each sensor is on.",
+                "The chain filter diverged; check which segment each sensor is on.",
                 t_s=broken * self._noise.step,
             )
         return ChainMotion(out[..., 0].copy(), out[..., 1].copy(), out[..., 2].copy())

@@ -85,7 +85,9 @@ def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
         silent = segments[int(np.argmin(known.any(axis=0)))]
         raise EstimationError(
             "no_standing",
-            Message("{silent} has no signal while standing; stand still before squatting.", silent=silent),
+            Message(
+                "{silent} has no signal during quiet standing; stand still before squatting.", silent=silent
+            ),
             sensor=silent,
             t_s=calibration.zero[0],
         )

@@ -132,7 +132,7 @@ def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segmen
         raise EstimationError(
             "segments_missing",
             Message(
-                "The squat needs sensors on {worn}; missing: {missing}.",
+                "A squat requires sensors on {worn}; missing: {missing}.",
                 worn=", ".join(worn),
                 missing=", ".join(missing),
             ),

@@ -175,7 +175,7 @@ def erkf_inputs(
         if not valid[:, i].any():
             raise SignalError(
                 "bad_signal",
-                Message("{name}: no valid sample; leave this sensor out.", name=name),
+                Message("{name}: no valid sample; exclude this sensor.", name=name),
                 sensor=name,
             )
     acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)

@@ -98,9 +98,9 @@ def report_turned_axes(total: Mapping[Segment, float]) -> tuple[Notice, ...]:
         return ()
     worst = max(off, key=lambda s: abs(total[s]))
     message = Message(
-        "The joints show that calibration took the wrong way for forward at {off}, by up to "
-        "{degrees:.0f}° ({worst}); it was turned. Frontal and transverse angles there are "
-        "less certain.",
+        "Joint motion shows that calibration misjudged the forward direction at {off}, by up to "
+        "{degrees:.0f}° ({worst}); it was corrected. Frontal and transverse angles there are less "
+        "certain.",
         off=", ".join(off),
         degrees=degrees(abs(total[worst])),
         worst=worst,

@@ -76,56 +76,56 @@ TOLD: Final[Mapping[str, tuple[str, Severity, str]]] = {
         "sensors_do_not_hang_together",
         "warning",
         (
-            "The two sensors at {of} do not hang together: their joint is {value:.0f} mm apart on average, "
-            "up to {warn:.0f} mm are expected. Check left and right, which sensor is on which segment, how "
-            "it is mounted, the body height, and that all clocks agree."
+            "The two sensors at {of} are inconsistent: their joint centres are {value:.0f} mm apart on "
+            "average, expected up to {warn:.0f} mm. Check left and right, sensor assignment and "
+            "alignment, body height, and clock synchronisation."
         ),
     ),
     "zero_velocity_refused_pct": (
         "zero_velocity_refused",
         "warning",
         (
-            "{value:.0f} % of the rests of {of} do not fit its path, up to {warn:.0f} % are expected, so "
-            "distances of this foot are doubtful. A loose sensor, a slipping shoe or unnoticed lost samples "
-            "look like this."
+            "{value:.0f} % of the foot-flat periods of {of} do not fit its path (expected up to "
+            "{warn:.0f} %), so distances of this foot are unreliable. Possible causes: a loose sensor, a "
+            "slipping shoe or undetected sample loss."
         ),
     ),
     "longest_moving_s": (
         "foot_never_still",
         "warning",
         (
-            "{of} does not rest on the floor for {value:.0f} s, at most {warn:.0f} s are expected: its path "
-            "is not bounded there. Toe walking, a treadmill or a sensor on another segment look like this."
+            "{of} is not flat on the floor for {value:.0f} s (expected at most {warn:.0f} s), so its "
+            "path drifts. Possible causes: toe walking, a treadmill or a sensor on another segment."
         ),
     ),
     "climb_pct": (
         "not_level",
         "warning",
         (
-            "The floor under {of} rises or falls by {value:.0f} % of the way walked, up to {warn:.0f} % are "
-            "expected on level ground: stairs, a slope, a sensor on the wrong foot or one that drifts."
+            "The floor under {of} rises or falls by {value:.0f} % of the distance walked (expected up to "
+            "{warn:.0f} % on level ground): stairs, a slope, a sensor on the wrong foot or sensor drift."
         ),
     ),
     "start_heading_off_deg": (
         "start_heading_off",
         "warning",
         (
-            "The joints show that {of} started {value:.0f}° off the heading taken for it, up to {warn:.0f}° "
-            "are expected: a sensor put on the wrong way round or on another segment, or a wrong "
-            "calibration. Rotations and frontal angles are doubtful."
+            "Joint motion shows that {of} started {value:.0f}° off its assumed heading (expected up to "
+            "{warn:.0f}°): a sensor attached the wrong way round or on another segment, or a wrong "
+            "calibration. Rotation and frontal angles are unreliable."
         ),
     ),
     "gap_s": (
         "gap_bridged",
         "info",
-        "{of} was lost for {value:.1f} s in one piece; its pose there is bridged by its neighbours.",
+        "{of} was lost for {value:.1f} s without a break; its pose is bridged by adjacent segments.",
     ),
 }
 """Finding → code, severity and words of the notice when it is not good."""
 
 STARTED_MOVING: Final = (
-    "The take starts without standing: the estimator began mid-walk and needs some strides to settle. Stand "
-    "still for 3 to 5 s first where possible."
+    "The trial starts without quiet standing: the estimator started mid-walk and needs a few strides to "
+    "settle. Stand still for 3 to 5 s first where possible."
 )
 
 

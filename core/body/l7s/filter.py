@@ -236,8 +236,9 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
             raise EstimationError(
                 "headings_apart",
                 Message(
-                    "The {side} foot faces {apart:.0f}° away from the {other} at the start: more than a "
-                    "person can. Check that no sensor is worn backwards and calibrate again.",
+                    "The {side} foot points {apart:.0f}° away from the {other} at the start, which is "
+                    "anatomically impossible. Check that no sensor is attached backwards and calibrate "
+                    "again.",
                     side=side,
                     apart=np.degrees(apart),
                     other=other,

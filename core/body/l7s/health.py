@@ -106,68 +106,70 @@ TOLD: Final[Mapping[str, tuple[str, str]]] = {
     "feet_out_of_place_pct": (
         "feet_drift_apart",
         (
-            "For {value:.0f} % of the time the feet are not side by side under the hips, up to {warn:.0f} % "
-            "are expected: the sensors disagree about where forward is. Angles and positions are wrong "
-            "there; calibrate again and check how the sensors are mounted."
+            "For {value:.0f} % of the time (expected up to {warn:.0f} %) the feet are not side by side "
+            "under the hips: the sensors disagree on the forward direction. Angles and positions are "
+            "wrong there; calibrate again and check sensor alignment."
         ),
     ),
     "phase_off_pct": (
         "feet_out_of_step",
         (
-            "The feet do not take turns: one rests {value:.0f} % of a stride away from the middle of the "
-            "other's, up to {warn:.0f} % are expected. Check that both clocks agree and that no sensor was "
-            "given twice."
+            "The feet do not alternate: one foot-flat is {value:.0f} % of a stride away from the middle "
+            "of the other foot's (expected up to {warn:.0f} %). Check clock synchronisation and that no "
+            "sensor was used twice."
         ),
     ),
     "toward_foot_mps2": (
         "feet_exchanged",
         (
-            "The pelvis falls toward the foot that it stands on ({value:+.2f} m/s², in walking it is below "
-            "{warn:g}): left and right foot look exchanged, or the pelvis sensor faces backwards."
+            "The pelvis accelerates towards the stance foot ({value:+.2f} m/s²; below {warn:g} in normal "
+            "walking): the left and right foot sensors appear swapped, or the pelvis sensor faces "
+            "backwards."
         ),
     ),
     "inner_foot_m": (
         "feet_exchanged",
         (
-            "In turns the inner foot goes further than the outer one ({value:+.2f} m per radian, right walks "
-            "stay below {warn:g}): left and right foot look exchanged."
+            "In turns the inner foot travels further than the outer one ({value:+.2f} m per radian, "
+            "expected below {warn:g}): the left and right foot sensors appear swapped."
         ),
     ),
     "pelvis_tilt_sd_deg": (
         "not_a_pelvis",
         (
-            "The sensor taken for the pelvis tilts by {value:.0f}° (standard deviation), in walking up to "
-            "{warn:.0f}° are expected: it sits on another segment, or this was no level walk."
+            "The pelvis sensor tilts by {value:.0f}° (standard deviation; expected up to {warn:.0f}° in "
+            "walking): it is on another segment, or the walk was not on level ground."
         ),
     ),
     "pelvis_rise_cm": (
         "pelvis_rises",
         (
-            "The pelvis rises and sinks by {value:.0f} cm within seconds, in walking up to {warn:.0f} cm are "
-            "expected. L7S takes its height to be constant: in squats, stairs and on chairs its angles are "
-            "too small. Wear seven sensors for those."
+            "The pelvis rises and falls by {value:.0f} cm within seconds (expected up to {warn:.0f} cm "
+            "in walking). L7S assumes a constant height: in squats, on stairs and when sitting its "
+            "angles are too small. Use seven sensors for those."
         ),
     ),
     "gap_s": (
         "gap_not_bridged",
         (
-            "{of} was lost for {value:.1f} s in one piece. L7S has no second sensor on a leg that could "
-            "bridge it; angles and positions are doubtful for some ten seconds from there on."
+            "{of} was lost for {value:.1f} s without a break. L7S has no second sensor on the leg to "
+            "bridge it; angles and positions are unreliable for about ten seconds afterwards."
         ),
     ),
     "places_moved_mm": (
         "places_not_found",
         (
-            "The places of pelvis and feet still moved by {value:.0f} mm when their calculation ended, up to "
-            "{warn:.0f} mm are expected: the sensors contradict each other or were lost for long. Angles and "
-            "positions are doubtful; check losses and which foot each sensor is on."
+            "The positions of pelvis and feet did not converge: they still changed by {value:.0f} mm "
+            "(expected up to {warn:.0f} mm). The sensors contradict each other or were lost for long "
+            "periods. Angles and positions are unreliable; check data loss and which foot each sensor is "
+            "on."
         ),
     ),
     "hinge_mm": (
         "legs_do_not_fit",
         (
-            "The legs cannot be fitted to the sensors: {of} is {value:.0f} mm off its hinge, a right set-up "
-            "leaves up to {warn:.0f} mm. Check sides, mounting, and losses that nobody noticed."
+            "The leg model does not fit the sensors: {of} is {value:.0f} mm off its hinge (expected up "
+            "to {warn:.0f} mm). Check sides, alignment, and undetected data loss."
         ),
     ),
 }
@@ -191,8 +193,8 @@ def l7s_notices(protocol: Protocol) -> tuple[Notice, ...]:
     if protocol not in LEVEL:
         return ()
     message = Message(
-        "L7S takes the pelvis to stay at its standing height; in '{protocol}' it does not. "
-        "Read its angles and positions for walking parts only, or wear seven sensors.",
+        "L7S assumes that the pelvis stays at standing height, which does not hold in '{protocol}'. Use "
+        "its angles and positions for walking only, or use seven sensors.",
         protocol=protocol,
     )
     return (Notice("pelvis_height_assumed", message),)

@@ -230,7 +230,8 @@ def take_of(
             raise EstimationError(
                 "sensor_missing",
                 Message(
-                    "L7S-{worn} needs {needed}; nothing of {segment}. Wear or map a sensor there.",
+                    "L7S-{worn} requires {needed}; there is no data for {segment}. Attach or assign a sensor "
+                    "there.",
                     worn=worn,
                     needed=", ".join(needed),
                     segment=segment,

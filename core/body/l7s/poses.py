@@ -187,9 +187,8 @@ def _never_still(steps: Mapping[Side, Bools]) -> tuple[Notice, ...]:
         Notice(
             "foot_never_still",
             Message(
-                "The {side} foot is never still in this take, so nothing bounds its speed; "
-                "positions and step lengths mean nothing. A treadmill or a sensor on another "
-                "segment looks like this.",
+                "The {side} foot is never stationary in this trial, so its speed drifts; positions and step "
+                "lengths are meaningless. Possible causes: a treadmill or a sensor on another segment.",
                 side=side,
             ),
             sensor=FOOT[side],

@@ -159,7 +159,8 @@ def find_hop(rate_hz: float) -> int:
 
 
 NOT_FOUND: Final = (
-    "The places of pelvis and feet cannot be found; check which foot each sensor is on and the body height."
+    "The positions of pelvis and feet cannot be determined; check which foot each sensor is on and the "
+    "body height."
 )
 
 

@@ -19,6 +19,7 @@ from sagittal.core.formats.aliases import segment_in
 from sagittal.core.formats.draft import WRAP_32, Draft, make_draft
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.formats.tables.layout import first_rows, has_decimal_comma
 from sagittal.core.frames import Floats
 
 LABEL: Final = "Movella DOT CSV"
@@ -66,7 +67,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
         separator,
         names,
         wanted,
-        decimal_comma=text.has_decimal_comma(text.first_row(body), separator),
+        decimal_comma=has_decimal_comma(first_rows(body), separator),
     )
     rate = spec.rate_hz if spec and spec.rate_hz else _rate(says)
     clock, ticks, wrap, told = _read_clock(table, says, source)

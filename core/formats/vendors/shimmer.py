@@ -17,6 +17,7 @@ from sagittal.core.formats import text
 from sagittal.core.formats.aliases import segment_in
 from sagittal.core.formats.draft import Draft, make_draft
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, TIME_UNITS, SourceSpec
+from sagittal.core.formats.tables.layout import first_rows, has_decimal_comma
 from sagittal.core.frames import GRAVITY, Floats
 
 LABEL: Final = "Shimmer Consensys CSV"
@@ -60,9 +61,8 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     said = dict(zip(columns, units, strict=False))
     devices = _parse(columns)
     wanted = [c for group in devices.values() for c in group.values()]
-    row = text.first_row(body)
     table = text.read_columns(
-        body, source, separator, columns, wanted, decimal_comma=text.has_decimal_comma(row, separator)
+        body, source, separator, columns, wanted, decimal_comma=has_decimal_comma(first_rows(body), separator)
     )
     return tuple(_sensor(device, group, said, table, source, spec) for device, group in devices.items())
 

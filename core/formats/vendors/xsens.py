@@ -19,6 +19,7 @@ from sagittal.core.formats import text
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.source import stem_of
 from sagittal.core.formats.source_spec import ACC_UNITS, GYR_UNITS, SourceSpec
+from sagittal.core.formats.tables.layout import has_decimal_comma
 from sagittal.core.frames import Floats
 
 _ACC: Final = ("Acc_X", "Acc_Y", "Acc_Z")
@@ -100,7 +101,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     wanted = ["PacketCounter", *(c for g in groups for c in g)]
     if "SampleTimeFine" in names:
         wanted.append("SampleTimeFine")
-    comma = text.has_decimal_comma(lines[0], layout.separator)
+    comma = has_decimal_comma(lines, layout.separator)
     table = text.read_columns(body, source, layout.separator, names, wanted, decimal_comma=comma)
     notices = [*table.notices, *cut_notice(source, cut)]
     acc = table.stack(_ACC) * _factor(ACC_UNITS, spec.acc_unit if spec else None)

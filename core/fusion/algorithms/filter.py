@@ -62,7 +62,9 @@ class RestMeans:
             if not (np.linalg.norm(vertical) > 0.0 and level(vertical, north, R)):
                 raise SignalError(
                     "bad_signal",
-                    Message("Sensor {value} shows no direction at rest; use another rest.", value=s),
+                    Message(
+                        "Sensor {value} has no usable direction at rest; use another still period.", value=s
+                    ),
                 )
             q[s] = from_matrix(R)
             if self.mag is not None:
@@ -76,7 +78,7 @@ def _mean(x: Floats) -> Floats:
     known = np.isfinite(x)
     count = known.sum(axis=0)
     if (count == 0).any():
-        raise SignalError("bad_signal", "A sensor has no sample at rest; use another rest.")
+        raise SignalError("bad_signal", "A sensor has no sample at rest; use another still period.")
     return np.asarray(np.where(known, x, 0.0).sum(axis=0) / count)
 
 
@@ -125,7 +127,7 @@ class FusionFilter:
             raise EstimationError(
                 "no_magnetometer",
                 Message(
-                    "{label} needs a magnetometer, and none is given. Choose one that does not.",
+                    "{label} requires a magnetometer and none is available. Choose a filter that does not.",
                     label=self.algorithm.label,
                 ),
             )
@@ -190,7 +192,7 @@ class FusionFilter:
             mag = None
         elif mag is None:
             raise EstimationError(
-                "no_magnetometer", "This filter was started with a magnetometer; give its samples."
+                "no_magnetometer", "This filter was started with a magnetometer; provide its samples."
             )
         if any(x is not None and np.shape(x) != shape for x in (gyr, acc, mag)):
             raise ParameterError("shape_mismatch", Message("Expected samples of shape {shape}.", shape=shape))

@@ -161,7 +161,7 @@ class GainTuner:
             )
             raise EstimationError(
                 "no_magnetometer",
-                Message("{label} is to run with a magnetometer, but {why}.", label=found.label, why=why),
+                Message("{label} is set to use a magnetometer, but {why}.", label=found.label, why=why),
             )
         params = found.gains() if start is None else start
         self._name, self._split, self._seed, self._version = algorithm, split, seed, code_version
@@ -173,7 +173,7 @@ class GainTuner:
             if not trial.scored.any():
                 raise SignalError(
                     "no_reference",
-                    Message("{name} has no reference while it moves; leave it out.", name=trial.name),
+                    Message("{name} has no reference during movement; exclude it.", name=trial.name),
                 )
         halves = [("train", t) for t in split.train] + [("validate", t) for t in split.validate]
         self._data = {t.name: t.sha256 for _, t in halves}
@@ -241,7 +241,7 @@ class GainTuner:
         verdict = (
             f"Better: {words}."
             if improved
-            else Message("Not better: {words}. Keep the gains it began with.", words=words)
+            else Message("No improvement: {words}. Keep the initial gains.", words=words)
         )
         if improved and worse:
             verdict += f" Worse on {', '.join(worse)}."

@@ -188,7 +188,8 @@ class SelfCalibratingFilter:
         """The same signals (S, n, 3), contiguous per sensor."""
         if self.uses_magnetometer and mag is None:
             raise EstimationError(
-                "no_magnetometer", "This filter was made for a magnetometer, and the block has no field."
+                "no_magnetometer",
+                "This filter was created with a magnetometer, but the block has no magnetic field.",
             )
         sensors = len(self._x)
         used = [v for v in (gyr, acc, mag if self.uses_magnetometer else None) if v is not None]
@@ -207,7 +208,7 @@ class SelfCalibratingFilter:
 
     def _finish(self, q: Floats) -> Floats:
         if not np.isfinite(q).all():
-            raise EstimationError("filter_diverged", "The orientation is no number; look at the signals.")
+            raise EstimationError("filter_diverged", "The orientation is not a number; check the signals.")
         return np.ascontiguousarray(np.swapaxes(q, 0, 1))
 
 

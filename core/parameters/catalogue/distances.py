@@ -56,8 +56,8 @@ ENTRIES: Final = (
         scale=(0, 1),
         comparison=DURATION,
         definition=(
-            "Distance along the direction of progression from the other foot's flat to this foot's; it "
-            "belongs to the foot that lands."
+            "Distance along the direction of progression from the other foot's foot-flat position to "
+            "this foot's; assigned to the landing foot."
         ),
         needs=("foot_path", "linked_feet"),
         trainable=True,
@@ -76,7 +76,7 @@ ENTRIES: Final = (
         scale=(-0.05, 0.35),
         comparison=WIDTH,
         definition=(
-            "Distance across the direction of progression between the flats of the two feet, ankle to ankle; "
+            "Mediolateral distance between the foot-flat positions of the two feet, ankle to ankle; "
             "negative when the feet cross."
         ),
         needs=("foot_path", "linked_feet", "standing_width"),
@@ -93,7 +93,8 @@ ENTRIES: Final = (
         digits=3,
         scale=(0, 0.2),
         comparison=SIZE,
-        definition="Largest distance of the foot outward from the straight line between its two flats.",
+        definition="Maximum outward deviation of the foot from the straight line between two successive "
+        "foot-flats.",
         needs=("foot_path",),
         trainable=True,
         better="lower",
@@ -101,7 +102,7 @@ ENTRIES: Final = (
     ),
     ParameterEntry(
         "max_heel_clearance_m",
-        label="Heel clearance, most",
+        label="Maximum heel clearance",
         group=DISTANCES,
         digits=2,
         scale=(0, 0.5),
@@ -115,7 +116,7 @@ ENTRIES: Final = (
     ),
     ParameterEntry(
         "min_toe_clearance_m",
-        label="Toe clearance, least in swing",
+        label="Minimum toe clearance in swing",
         group=DISTANCES,
         digits=3,
         scale=(-0.02, 0.12),
@@ -134,7 +135,7 @@ ENTRIES: Final = (
         digits=1,
         scale=(0, 100),
         comparison=SIZE,
-        definition="Way of the take from rest to rest of a foot, turns and all; mean of the feet.",
+        definition="Distance walked in the trial between foot-flats, including turns; mean of both feet.",
         needs=("foot_path",),
         of="take",
         counted="feet",

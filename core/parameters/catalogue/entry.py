@@ -20,7 +20,7 @@ NEEDS: Final[Mapping[Need, str]] = {
     "foot_off": "foot-off",
     "other_foot": "contacts of both feet",
     "linked_feet": "sensors on both legs and the pelvis",
-    "standing_width": "how far apart the ankles stand",
+    "standing_width": "distance between the ankles while standing",
     "shoe": "the shape of the shoe",
     "hip": "sensors on pelvis and thigh",
     "knee": "sensors on thigh and shank",
@@ -29,7 +29,7 @@ NEEDS: Final[Mapping[Need, str]] = {
     "trunk_sensor": "a sensor on the pelvis or the chest",
     "forward": "the direction of walking",
     "daily_life": "a recording of daily life with a sensor on the chest or the lower back",
-    "squat": "a take of squats with sensors on shank, thigh and pelvis",
+    "squat": "a squat trial with sensors on shank, thigh and pelvis",
 }
 """What a parameter cannot be measured without, beside contacts, in words."""
 
@@ -66,7 +66,7 @@ SWAY: Final = "Sway in quiet standing"
 FUNCTIONAL: Final = (TUG, CHAIR, WALK_TESTS, SWAY)
 """Groups of the functional tests (core/functional_tests)."""
 DAILY: Final = "Daily life"
-LIMITS: Final = "Values against limits"
+LIMITS: Final = "Values outside limits"
 """Group of the figures that are only compared with a limit: no table has rows of them."""
 
 UNITS: Final[Mapping[str, tuple[str, str]]] = {

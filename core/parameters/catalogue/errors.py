@@ -74,7 +74,7 @@ STEP_LENGTH: Final = MeasurementErrors(
 )
 """neura_walk +4 ± 16 mm; virtual people within 25 mm."""
 STEP_WIDTH: Final = MeasurementErrors(
-    Message("{PATH}, linked; width of standing", PATH=_PATH), common=0.015, own=0.012, random=0.010
+    Message("{PATH}, linked; standing width", PATH=_PATH), common=0.015, own=0.012, random=0.010
 )
 """neura_walk +15 ± 7 mm, and what a ruler between the ankles is read to."""
 CIRCUMDUCTION: Final = MeasurementErrors(_PATH, common=0.010, own=0.006, random=0.004)
@@ -117,7 +117,7 @@ FOOT_TURN: Final = _angle("heading of the foot", 0.0, 1.0)
 """Own estimates, from headings (validation/report.md, "Headings on neura_walk")."""
 
 
-TEST_TOTAL: Final = MeasurementErrors("first and last movement, on simulated people", own=0.04)
-TEST_EDGE: Final = MeasurementErrors("where a segment ends, on simulated people", own=0.06)
+TEST_TOTAL: Final = MeasurementErrors("first and last movement, from simulated people", own=0.04)
+TEST_EDGE: Final = MeasurementErrors("segment boundaries, from simulated people", own=0.06)
 """Simulated timed up and go of the twelve virtual people (validation/accuracy/test_functional_tests.py),
 rounded up; real people were not measured against a reference."""

@@ -17,24 +17,25 @@ from sagittal.core.parameters.catalogue.entry import (
 ENTRIES: Final = (
     ParameterEntry(
         "knee_flexion_peak_swing_deg",
-        label="Knee flexion, peak in mid-swing",
+        label="Peak knee flexion in mid-swing",
         group=LIMITS,
         digits=1,
         scale=(10, 90),
         comparison=FLEXION,
-        definition="Largest flexion of the knee in mid-swing (60 to 85 % of the stride), from the person's "
-        "own standing.",
+        definition=(
+            "Maximum flexion of the knee in mid-swing (60 to 85 % of the stride), relative to standing."
+        ),
         needs=("knee",),
         curve=CurveFigure("knee_flexion", "max", 60, 85),
     ),
     ParameterEntry(
         "pelvis_obliquity_max_swing_deg",
-        label="Pelvic obliquity, peak in swing",
+        label="Peak pelvic obliquity in swing",
         group=LIMITS,
         digits=1,
         scale=(-15, 15),
         comparison=HEIGHT,
-        definition="Largest rise of the pelvis on the side that swings, from the person's own standing.",
+        definition="Maximum elevation of the pelvis on the swing side, relative to standing.",
         needs=("pelvis_sensor",),
         curve=CurveFigure("pelvis_obliquity", "max", 60, 100),
         norm=NormKey("angles", "pelvis_obliquity_swing_max(60-100%)"),

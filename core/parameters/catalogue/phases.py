@@ -122,7 +122,7 @@ ENTRIES: Final = (
         digits=1,
         scale=(0, 60),
         comparison=DURATION,
-        definition="From the heel's leaving the floor to foot-off, as a share of stance.",
+        definition="From heel-off to foot-off, as a share of stance.",
         needs=("foot_sensor", "foot_off"),
     ),
     ParameterEntry(
@@ -142,7 +142,7 @@ ENTRIES: Final = (
         digits=1,
         scale=(0, 30),
         comparison=DURATION,
-        definition="From the rise of the heel to the other foot's contact, as a share of the stride.",
+        definition="From heel-off to the other foot's contact, as a share of the stride.",
         needs=("foot_sensor", "other_foot", "foot_off"),
     ),
     ParameterEntry(

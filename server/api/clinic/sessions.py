@@ -69,7 +69,7 @@ def read_recording(
         recording = recordings.current(c, session_id)
     trail.record_watched(user, "recording.opened", "session", session_id)
     if recording is None:
-        raise NotFound("recording of session", session_id)
+        raise NotFound("recording of visit", session_id)
     return make_answer(schemas.RecordingAnswer, recording)
 
 

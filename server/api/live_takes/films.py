@@ -64,10 +64,12 @@ async def add_piece(
             piece += some
             if len(piece) > films.MOST_PIECE_BYTES:
                 raise Problem(
-                    413, "file_too_large", f"A piece has at most {films.MOST_PIECE_BYTES} bytes; cut it."
+                    413, "file_too_large", f"A piece has at most {films.MOST_PIECE_BYTES} bytes; split it."
                 )
     except ClientDisconnect:
-        raise Problem(400, "upload_cut", "The connection broke within the piece. Send it again.") from None
+        raise Problem(
+            400, "upload_cut", "The connection was lost during this piece. Send it again."
+        ) from None
     return await run_in_threadpool(intake.add, take_id, token, number, bytes(piece))
 
 

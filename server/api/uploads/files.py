@@ -82,7 +82,7 @@ async def post_files(
     """Add files from a form with the field `files`; a rejected file ends the request."""
     if "content-length" not in request.headers:
         raise Problem(
-            411, "length_required", "A form upload must say its length. Send a Content-Length header."
+            411, "length_required", "A form upload must state its length. Send a Content-Length header."
         )
     # boundaries and part headers take some hundred bytes a file
     size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
@@ -184,4 +184,6 @@ async def read_megabytes(request: Request) -> AsyncIterator[bytes]:
 
 
 def _cut() -> Problem:
-    return Problem(400, "upload_cut", "The connection broke before the file was complete. Upload it again.")
+    return Problem(
+        400, "upload_cut", "The connection was lost before the file was complete. Upload it again."
+    )

@@ -115,7 +115,9 @@ async def add_part(
             this = await run_in_threadpool(keep, this.offset, piece)
     except ClientDisconnect:
         raise Problem(
-            400, "upload_cut", "The connection broke within the part. Ask how far it is and go on there."
+            400,
+            "upload_cut",
+            "The connection was lost during this part. Query the offset and resume from there.",
         ) from None
     return this
 

@@ -37,7 +37,7 @@ KIND_WORDS: Final = {
     "compare_filters": "Comparison of filters",
     "tune": "Tuning of a filter",
     "sensitivity": "Sensitivity of squats",
-    "export": "File for another program",
+    "export": "Export file",
 }
 
 

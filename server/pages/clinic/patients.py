@@ -91,7 +91,7 @@ def list_patients(
         if p.id in newest:
             last = judge_visit(reviewed, newest[p.id], records.get(newest[p.id].id), edits)
         else:
-            last = {"kind": "none", "text": "No session yet"}
+            last = {"kind": "none", "text": "No visit yet"}
         row: dict[str, Any] = {
             "visits": p.sessions,
             "last": p.last_visit,

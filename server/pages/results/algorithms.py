@@ -27,16 +27,16 @@ from sagittal.server.uploads import reference_files
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 STAGES: Final = (
-    ("analysis", "Analyse the take as before"),
+    ("analysis", "Analyse the trial as before"),
     ("filters", "Run the filters"),
     ("comparing", "Compare them"),
 )
 """Stages of a comparison, in words."""
 
 FILE_WORDS: Final = {
-    "filters.json": "Everything on this page",
+    "filters.json": "All content of this page",
     "filters.csv": "Cost and agreement of each filter",
-    "spread.csv": "Spread over the take, in stance and in swing",
+    "spread.csv": "Spread over the trial, in stance and swing",
     "spread_cycle.csv": "Spread over the gait cycle",
     "spread_time.csv": "Spread over time",
     "orientations.parquet": "Orientation of every segment by each filter",

@@ -34,21 +34,21 @@ FILE_WORDS: Final[Mapping[str, str]] = {
     "analysis.json": "Quality, calibration, parameters, warnings, provenance",
     "angles.parquet": "Joint angles in degrees over time",
     "poses.parquet": "Orientation and position of every segment over time",
-    "tracks.parquet": "Paths of the feet and what else strides are measured on",
-    "repaired.json": "The set-up that is proposed instead of this one",
-    "signals.parquet": "What the sensors measured, on one time axis",
-    "events.csv": "Contacts and foot-offs as detected",
-    "steps.csv": "Steps of the trunk sensor, where no foot carries one",
-    "repetitions.csv": "Every squat with its measures, and why it was left out",
-    "activity.json": "Daily life: days, hours, transitions, walking bouts, how the sensor was worn",
-    "activity_spans.parquet": "What the person did from when to when",
+    "tracks.parquet": "Foot trajectories and other stride-level data",
+    "repaired.json": "The proposed replacement set-up",
+    "signals.parquet": "Sensor signals on a common time axis",
+    "events.csv": "Detected contacts and foot-offs",
+    "steps.csv": "Steps from the trunk sensor, if there is no foot sensor",
+    "repetitions.csv": "All squats with their measures and any reason for exclusion",
+    "activity.json": "Daily life: days, hours, transitions, walking bouts and wear time",
+    "activity_spans.parquet": "Activities with start and end times",
     "activity_spans.csv": "The same as text",
     "activity_inclination.parquet": "Inclination of the trunk in degrees, once a second",
     "activity_steps.parquet": "Time of every step of daily life",
     "activity_hours.csv": "Steps and minutes of each posture in every hour",
-    "transitions.csv": "Postural transitions, and leans that do not count with the reason",
-    "walking_bouts.csv": "Every walk of daily life with its steps and cadence",
-    "strides.csv": "Every stride with its parameters, and why it was left out",
+    "transitions.csv": "Postural transitions, and rejected trunk leans with the reason",
+    "walking_bouts.csv": "All walking bouts of daily life with steps and cadence",
+    "strides.csv": "All strides with their parameters and any reason for exclusion",
 }
 
 
@@ -128,7 +128,7 @@ def _list_exports(c: Connection, context: Mapping[str, Any]) -> list[dict[str, A
 
 def _describe_file(name: str) -> str:
     if name.startswith("sensitivity-"):
-        return "How far the angles of squats move with each measure"
+        return "Sensitivity of squat angles to each input"
     return FILE_WORDS.get(name, "")
 
 

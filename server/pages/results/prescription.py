@@ -31,17 +31,17 @@ FIRST: Final = "step_length_m"
 ON_CARD: Final = ("Target", "Shown as", "Schedule", "Level", "Ends")
 
 MODES: Final = (
-    ("bar", "Bar", "height by the value, target marked"),
-    ("zone", "Zone", "green, yellow, red with its side"),
-    ("tone", "Tone", "outside the zone, louder and higher with the error"),
+    ("bar", "Bar", "height shows the value, target marked"),
+    ("zone", "Zone", "green, yellow or red, with the direction"),
+    ("tone", "Tone", "outside the zone, louder and higher with larger error"),
     ("tick", "Tick", "at every contact of the foot"),
 )
 
 SOURCES: Final = (
     ("norm", "Norm", "healthy people at this person's speed"),
-    ("own_better_side", "Own better side", "the other side, where it is better, in the last walk"),
-    ("own_baseline", "Own baseline", "the same side in the last walk"),
-    ("manual", "Entered", "mean and SD as typed"),
+    ("own_better_side", "Person's better side", "the other side in the last walk, if it is the better one"),
+    ("own_baseline", "Person's baseline", "the same side in the last walk"),
+    ("manual", "Entered", "mean and SD as entered"),
 )
 
 
@@ -64,15 +64,16 @@ class PrescriptionPreset:
 
 PRESETS: Final = (
     PrescriptionPreset(
-        "longer", "Longer steps", "of the shorter side, as stepping stones", "step_length_m", ("zone",),
+        "longer", "Longer steps", "of the shorter side, shown as stepping stones", "step_length_m", ("zone",),
         ("own_better_side", "norm", "own_baseline"),
     ),
     PrescriptionPreset(
-        "carry", "Longer on this leg", "time on one leg as on the other, a bar", "single_support_pct",
+        ""
+        "carry", "Longer stance on this leg", "equal stance time on both legs; bar", "single_support_pct",
         ("bar",), ("own_better_side", "norm", "own_baseline"),
     ),
     PrescriptionPreset(
-        "heel", "Heel first", "toes higher when the foot lands, a bar and a tone", "foot_pitch_ic_deg",
+        "heel", "Heel first", "toes higher at initial contact, as a bar and a tone", "foot_pitch_ic_deg",
         ("bar", "tone"), ("own_better_side", "norm", "own_baseline"),
     ),
 )  # fmt: skip

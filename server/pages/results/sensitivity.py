@@ -26,8 +26,8 @@ from sagittal.server.uploads import reference_files
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 STAGES: Final = (
-    ("analysis", "Analyse the take as before"),
-    ("parameters", "Put 24 measures off, one at a time"),
+    ("analysis", "Analyse the trial as before"),
+    ("parameters", "Perturb 24 inputs, one at a time"),
 )
 """Stages of a sensitivity analysis, in words."""
 

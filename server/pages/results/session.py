@@ -348,7 +348,7 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
         "used": model.used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} used",
+        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} included",
         "empty_reason": explain_emptiness(model),
     }
 
@@ -359,8 +359,8 @@ def explain_emptiness(model: ReportModel) -> str:
     cycle = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
     read = f"{seconds(model.duration_s)} of data were read, but no complete {cycle} was seen in them."
     if cycle == "squat":
-        return model.problem or f"{read} A squat bends the knee by 20° or more, and comes back."
-    question = "Is a sensor on each foot, and is it the one the mapping says?"
+        return model.problem or f"{read} A squat flexes the knee by at least 20° and returns."
+    question = "Check that there is a sensor on each foot and that it is assigned correctly."
     return model.problem or " ".join([read, *(causes or [question])])
 
 

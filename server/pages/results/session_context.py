@@ -17,14 +17,14 @@ from sagittal.server.results import analyses, controls
 
 STAGE_NAMES: Final[Mapping[str, str]] = {
     "reading": "Read the files",
-    "timeline": "Lay all sensors on one time axis",
-    "agreement": "Compare the clocks and places of the sensors",
+    "timeline": "Synchronise all sensors",
+    "agreement": "Check sensor clocks and placement",
     "quality": "Check the data",
-    "calibration": "Calibrate: how each sensor sits on its segment",
-    "orientation": "Find the orientation of each segment",
-    "events": "Find contacts and strides",
-    "mounting": "Align the sensors by the joints they share",
-    "poses": "Build the figure",
+    "calibration": "Calibrate sensor-to-segment alignment",
+    "orientation": "Estimate the orientation of each segment",
+    "events": "Detect contacts and strides",
+    "mounting": "Align the sensors at shared joints",
+    "poses": "Build the avatar",
     "angles": "Compute joint angles",
     "parameters": "Compute parameters",
 }
@@ -35,7 +35,7 @@ sagittal.core.pipeline itself takes seconds to import.
 
 STAGES_OF_DAYS: Final[Mapping[str, str]] = {
     "reading": "Read the files",
-    "activity": "Go through the days",
+    "activity": "Process the days",
     "quality": "Check the data",
 }
 """The same of a recording of daily life."""

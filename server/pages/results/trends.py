@@ -121,7 +121,7 @@ def view_daily_trend(walked: PatientHistory | None, performance: Sequence[Perfor
         {
             "day": d.day,
             "href": f"/sessions/{d.session_id}",
-            "where": "home" if d.counted else "home, worn too short",
+            "where": "home" if d.counted else "home, wear time too short",
             "speed": None,
             "steps": str(d.steps),
             "cadence": None if d.cadence_spm is None else format_number(d.cadence_spm, 0),

@@ -97,7 +97,7 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         done = histories.list_analysed(c, patient.id)
         this = next((a for a in done if a.session.id == sid), None)
         if this is None or this.session.protocol not in sessions.WALKS:
-            raise Conflict("no_walk", "This session has no analysed walk, so there is no leaflet of it.")
+            raise Conflict("no_walk", "This visit has no analysed walk, so there is no leaflet.")
         previous = comparisons.find_previous(c, this.session, done)
         written = prescriptions.of_patient(c, patient.id)
     new = reviewed.read_numbers(this.found, this.edits)
@@ -135,7 +135,9 @@ def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[st
         done, plans = histories.read(c, patient)
     walks = [a for a in done if a.session.protocol != "activity"]
     if not walks:
-        raise Conflict("no_visit", "No visit of this patient is analysed, so there is no report over visits.")
+        raise Conflict(
+            "no_visit", "No visit of this patient has been analysed, so there is no report over visits."
+        )
     history = histories.read_history(reviewed, patient, walks, plans)
     titles = {a.session.id: a.session.title for a in walks}
     conditions = {a.session.id: a.condition.words for a in walks}

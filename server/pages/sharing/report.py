@@ -156,5 +156,5 @@ def show_shared(
 def _gather(db: Database, reviewed: ReviewedAnalyses, sid: str, user: Identity) -> dict[str, Any]:
     context = gather_report(db, reviewed, sid, user, PAPER)
     if context["report"] is None:
-        raise NotFound("analysis of session", sid)
+        raise NotFound("analysis of visit", sid)
     return context

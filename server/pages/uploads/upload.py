@@ -45,19 +45,19 @@ CLOCK_WORDS: Final = {
 }
 
 BASIS_WORDS: Final = {
-    "manifest": "As set before. Change what is not right.",
-    "remembered": "As at this patient's last visit with these sensors. Check it.",
-    "declared": "As the files say. Change what is not right.",
-    "label": "Guessed from the names. Change what is not right.",
-    "last_take": "As in the last take with these sensors. Check it.",
-    "movement": "Guessed from how each sensor moves.",
+    "manifest": "As set before. Correct if necessary.",
+    "remembered": "As at this patient's last visit with these sensors. Please check.",
+    "declared": "Taken from the files. Correct if necessary.",
+    "label": "Suggested from the names. Correct if necessary.",
+    "last_take": "As in the last trial with these sensors. Please check.",
+    "movement": "Suggested from the motion of each sensor.",
 }
 
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
 """Severity of a notice → its look."""
 
 GONIOMETER: Final = (
-    ("pelvis_tilt", "Pelvic tilt forward"),
+    ("pelvis_tilt", "Anterior pelvic tilt"),
     ("hip_flexion_l", "Hip flexion, left"),
     ("hip_flexion_r", "Hip flexion, right"),
     ("knee_flexion_l", "Knee flexion, left"),
@@ -68,13 +68,13 @@ GONIOMETER: Final = (
 """Standing angles that the page asks for; the manifest takes all of `core.subject.standing_angles`."""
 
 TAPE: Final = (
-    ("leg_m", "Leg", "Front upper iliac spine to inner ankle, standing."),
-    ("thigh_m", "Thigh", "Greater trochanter to the outer knee joint line."),
-    ("shank_m", "Shank", "Outer knee joint line to outer ankle."),
-    ("ankle_height_m", "Ankle over the floor", "Outer ankle to the sole."),
+    ("leg_m", "Leg", "Anterior superior iliac spine (ASIS) to medial malleolus, standing."),
+    ("thigh_m", "Thigh", "Greater trochanter to the lateral knee joint line."),
+    ("shank_m", "Shank", "Lateral knee joint line to lateral malleolus."),
+    ("ankle_height_m", "Ankle height", "Lateral malleolus to the sole."),
     ("foot_m", "Foot", "Heel to longest toe."),
-    ("pelvis_width_m", "Pelvis, width", "Between the front upper iliac spines."),
-    ("pelvis_depth_m", "Pelvis, depth", "Their middle to that of the back ones; used with the width."),
+    ("pelvis_width_m", "Pelvis, width", "Between the anterior superior iliac spines (ASIS)."),
+    ("pelvis_depth_m", "Pelvis, depth", "Mid-ASIS to mid-PSIS; used together with the width."),
 )
 """Lengths of `subject.measures` that the page asks for, and how they are taken."""
 
@@ -228,7 +228,7 @@ def view_inspection(
     guessed = any(basis == "movement" for _, basis in chosen.values())
     bases = {basis for segment, basis in chosen.values() if segment and basis}
     hint = next(
-        (text for basis, text in BASIS_WORDS.items() if basis in bases), "Say where each sensor sits."
+        (text for basis, text in BASIS_WORDS.items() if basis in bases), "Assign each sensor to a segment."
     )
     left_out = [read_message(n) for n in results["notices"] if n["code"] in ABOUT_FILES]
     return {
@@ -347,9 +347,7 @@ def _notices(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]
             if len(copies) == 1
             else f"{len(copies)} sensors are copies of others"
         )
-        message = (
-            f"The same samples under another id: {pairs}. Copies are not analysed unless you choose them."
-        )
+        message = f"Identical samples under another id: {pairs}. Copies are not analysed unless selected."
         notices.append({"kind": "", "title": title, "message": message})
     everything = [*inspection["notices"], *(n for d in devices for n in d["notices"])]
     for n in everything:

@@ -137,7 +137,7 @@ def strip_svg(strides: Strides, duration_s: float, height: int = 92) -> str:
     )
     return (
         f'<div class="chart strip"><svg width="100%" height="{plot_height}" overflow="visible" role="img">'
-        "<title>Strides of this take over time; a cross marks a stride left out</title>"
+        "<title>Strides of this trial over time; a cross marks an excluded stride</title>"
         f'{stretch(marks)}<line class="cursor now" x1="0" x2="0" y1="0" y2="100%"/>'
         f"{letters}{make_time_labels(duration_s, plot_height, 15)}</svg></div>"
     )
@@ -149,7 +149,7 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
     title_element, cross = "", ""
     if s.excluded_reason is not None:
-        title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, left out: "
+        title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, excluded: "
         title_element = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
         width = end - start
         cross = f'<path class="xx" d="M{start} {top + 60}l{width} 300M{start} {top + 360}l{width}-300"/>'

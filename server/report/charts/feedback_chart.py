@@ -64,7 +64,7 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
         if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
             x_text = f"{format_coordinate(x(i - 0.5) / 10)}%"
             plot.add_text(x_text, plot.height + 28, f"level {m.cue.level}", "words", "start")
-    title = f"{term.label} of every stride over the zone of its level; the table has the numbers"
+    title = f"{term.label} of every stride against the target zone of its level; values in the table"
     return plot.draw("chart fb-plot", title)
 
 

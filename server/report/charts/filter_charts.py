@@ -92,5 +92,5 @@ def draw_agreement(
     plot.add_text("100%", plot.height, "mean of filter and reference", "", "end", dy=30)
     plot.add_text("0", 0, "Filter more ↑", "words halo", "start", dx=5, dy=11)
     return plot.draw(
-        "chart cycle x-unit", f"{title}: filter less reference over their mean; the table has the numbers"
+        "chart cycle x-unit", f"{title}: filter minus reference over their mean; values in the table"
     )

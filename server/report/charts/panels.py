@@ -23,15 +23,16 @@ from sagittal.server.report.words.estimator import list_estimated_variables
 from sagittal.server.report.words.wording import VARIABLES, ZERO_WORDS, Variable, reason_words
 
 NO_BAND: Final[Mapping[Zero, str]] = {
-    "standing": "No norm band: these curves start from this person's standing, the norm from the anatomical "
-    "zero. Enter goniometer angles of standing to compare.",
-    "walking": "No norm band: no usable standing, so these curves start from their own mean in walking.",
-    "stride_mean": "No norm band: measured from its own mean over the stride, the norm is not.",
-    "anatomical": "No norm band: the norm is measured from standing.",
+    "standing": "No norm band: these curves are relative to this person's standing, the norm to the "
+    "anatomical zero. Enter goniometer angles in standing to compare.",
+    "walking": "No norm band: no usable quiet standing, so these curves are relative to their own mean in "
+    "walking.",
+    "stride_mean": "No norm band: measured relative to its own mean over the stride, unlike the norm.",
+    "anatomical": "No norm band: the norm is relative to standing.",
 }
 """Zero of a curve → why none of the known bands may stand behind it."""
 
-FEW_BAND: Final = f"No norm band: fewer than {COMPARED} strides of a side are compared with nothing."
+FEW_BAND: Final = f"No norm band: at least {COMPARED} strides per side are needed for a comparison."
 """The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40

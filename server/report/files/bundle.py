@@ -35,8 +35,8 @@ EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "move_event": ("event moved", "events moved"),
     "add_event": ("event added", "events added"),
     "delete_event": ("event deleted", "events deleted"),
-    "exclude_stride": ("stride left out", "strides left out"),
-    "include_stride": ("stride counted in spite of a rule", "strides counted in spite of a rule"),
+    "exclude_stride": ("stride excluded", "strides excluded"),
+    "include_stride": ("stride included despite a rule", "strides included despite a rule"),
 }
 """Kind of edit → words for one and for several."""
 
@@ -171,8 +171,8 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(
         "edited",
-        f"Changed by hand: {', '.join(f'{n} {words[n > 1]}' for words, n in done.items())}. The stored "
-        "analysis stays as it was; its files are those before the changes.",
+        f"Manual changes: {', '.join((f'{n} {words[n > 1]}' for words, n in done.items()))}. The stored "
+        "analysis is unchanged; its files are from before the changes.",
         severity="info",
     )
     warnings = [n for n in bundle.warnings if n.code not in NOTICES]

@@ -18,7 +18,7 @@ from sagittal.server.report.view.table import ParameterRow
 from sagittal.server.report.words.change_words import SCORE_TERMS, ChangeWords, change_words, find_term
 from sagittal.server.report.words.wording import format_number, reason_words
 
-STANDING: Final = "from standing"
+STANDING: Final = "relative to standing"
 """Of what a change is whose row stands for another zero."""
 
 Group = tuple[str, tuple[ParameterRow, ...]]

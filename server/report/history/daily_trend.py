@@ -179,4 +179,4 @@ class _TimePanel(PlotArea):
             day = self._first + dt.timedelta(days=days)
             label = f"{day.day} {MONTHS[day.month - 1]}"
             self.add_text(f"{format_coordinate(self.x(day) / 10)}%", self.height, label, "", "middle", dy=15)
-        return self.draw("chart trend-plot", f"{title} over time; the table has the numbers")
+        return self.draw("chart trend-plot", f"{title} over time; values in the table")

@@ -52,7 +52,7 @@ def draw_device(
     plot.add_dot(x, v, "pl-b", 5.0)
     x_text, text = f"{format_coordinate(x / 10)}%", format_number(v, digits)
     plot.add_text(x_text, plot.px(v), text, "strong halo", "middle", dy=-11)
-    return plot.draw("chart trend-plot", f"{title} over the takes; the table has the numbers")
+    return plot.draw("chart trend-plot", f"{title} over the trials; values in the table")
 
 
 def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:

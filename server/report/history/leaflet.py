@@ -108,11 +108,11 @@ def _say(figure: PlainFigure, value: float) -> str:
 def _judge(figure: PlainFigure, change: Change | None) -> str:
     """Name a change only if it exceeds the measurement error."""
     if change is not None and change.reason == NOT_MEASURED_ALIKE:
-        return "It was measured in another way last time, so the two numbers are not compared."
+        return "It was measured differently last time, so the two values are not compared."
     if change is None or change.difference is None:
-        return "There is no earlier number to compare with."
+        return "There is no earlier value to compare with."
     if change.verdict in REAL:
         return f"This is {figure.up if change.difference > 0 else figure.down} than last time."
     if change.verdict is None:
-        return "Nobody can say yet whether this is a change."
+        return "It is not yet possible to say whether this is a change."
     return "This is about the same as last time."

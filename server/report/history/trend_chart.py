@@ -96,7 +96,7 @@ def trend_svg(
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return plot.draw(
         "chart trend-plot small" if small else "chart trend-plot",
-        f"{title} over the visits; the table has the numbers",
+        f"{title} over the visits; values in the table",
     )
 
 

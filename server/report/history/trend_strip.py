@@ -134,7 +134,7 @@ def _explain_none(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
     if last.change is not None or last.visit != len(visits) - 1:
         return ""
     if line.base is None:
-        return "not compared: trainings only, no assessment"
+        return "not compared: only trainings, no assessment"
     if visits[-1].feedback:
         return "not compared: walked with feedback"
     return "first value to compare with"

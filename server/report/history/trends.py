@@ -201,7 +201,7 @@ def _score_norm(name: str, visits: Sequence[AnalysedVisit]) -> NormValue | None:
         return None
     # GDI* is 100 ± 10 among the reference people by its definition
     mean, sd = (spread.mean_deg, spread.sd_deg) if name == "gps_sagittal_deg" else (100.0, 10.0)
-    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave one out")
+    return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave-one-out")
 
 
 def _line(

@@ -133,7 +133,7 @@ def _mark(s: StrideValue, y: float, duration_s: float) -> str:
     css, radius = CSS[s.side]
     x = 100 * 0.5 * (s.start_s + s.end_s) / duration_s
     title = f"{s.side} stride at {s.start_s:.2f} s: {s.text}" + (
-        f", left out: {quote(s.excluded)}" if s.excluded else ""
+        f", excluded: {quote(s.excluded)}" if s.excluded else ""
     )
     faded = "" if s.counted else " out"
     return (

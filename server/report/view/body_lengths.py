@@ -12,9 +12,9 @@ from sagittal.server.report.words.wording import format_number
 TITLES: Final[Mapping[str, tuple[str, str]]] = {
     "thigh": ("Thigh, hip to knee centre", "Winter 2009, from {}"),
     "shank": ("Shank, knee to ankle centre", "Winter 2009, from {}"),
-    "ankle_height": ("Ankle centre over the sole", "Winter 2009, from {}"),
+    "ankle_height": ("Ankle centre above the sole", "Winter 2009, from {}"),
     "foot": ("Foot, heel to toe", "Winter 2009, from body height"),
-    "hip_width": ("Between the hip centres", "own share of body height"),
+    "hip_width": ("Between the hip centres", "person's share of body height"),
 }
 """Length → its title and what an estimate rests on, `{}` being the measured leg or else the height."""
 
@@ -40,13 +40,13 @@ def view_lengths(body: Mapping[str, Any] | None) -> tuple[BodyLength, ...]:
     if height is not None:
         rows.append(BodyLength("Body height", f"{format_number(height, 2)} m", True, "as entered"))
     elif leg is None:
-        rows.append(BodyLength("Body height", f"{NOMINAL_HEIGHT_M:.2f} m", False, "nobody gave one"))
+        rows.append(BodyLength("Body height", f"{NOMINAL_HEIGHT_M:.2f} m", False, "none entered"))
     if leg is not None:
-        rows.append(BodyLength("Leg, iliac spine to ankle", f"{format_number(leg, 3)} m", True, "by tape"))
+        rows.append(BodyLength("Leg, ASIS to ankle", f"{format_number(leg, 3)} m", True, "by tape measure"))
     scaled = "body height" if leg is None else "leg length"
     for name, (title, guess) in TITLES.items():
         length = body["lengths"][name]
-        by_tape = BY_PELVIS if name == "hip_width" else "by tape"
+        by_tape = BY_PELVIS if name == "hip_width" else "by tape measure"
         source = by_tape if length["measured"] else guess.format(scaled)
         rows.append(BodyLength(title, f"{format_number(length['m'], 3)} m", length["measured"], source))
     return tuple(rows)

@@ -15,7 +15,7 @@ from sagittal.server.report.words.wording import format_number, place_words, spe
 VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "pass": ("ok", "pass"),
     "redo": ("bad", "redo"),
-    "not_judged": ("none", "not judged"),
+    "not_judged": ("none", "not assessed"),
 }
 """Verdict → its shape and its word."""
 
@@ -92,7 +92,7 @@ def view_calibration_checks(
         verdict = next((v for v in ("redo", "pass") if v in kinds), "not_judged")
         kind, word = VERDICT_WORDS[verdict]
         rows = tuple(_view_check(c) for c in whole)
-        segments.insert(0, CheckedSegment(WHOLE, "Whole take", kind, word, "", "", rows))
+        segments.insert(0, CheckedSegment(WHOLE, "Whole trial", kind, word, "", "", rows))
     return CalibrationChecks(
         VERDICT_WORDS[score["verdict"]][0], say_verdict(score["verdict"], checks), tuple(segments)
     )
@@ -104,16 +104,16 @@ def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
     if verdict == "pass":
         return plural(
             len(checked),
-            "The calibration passes the one check that could be judged.",
-            f"The calibration passes all {len(checked)} checks that could be judged.",
+            "Calibration: the one applicable check passed.",
+            f"Calibration: all {len(checked)} checks passed.",
         )
     if verdict == "not_judged":
-        return "This take allows no check of its calibration."
+        return "The calibration of this trial cannot be checked."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
     shortened = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
     listed = " and ".join(filter(None, (", ".join(shortened[:-1]), shortened[-1])))
-    which = plural(len(failed), "checks fails", "checks fail")
+    which = plural(len(failed), "checks failed", "checks failed")
     return f"Calibrate again: {len(failed)} of {len(checked)} {which}, at the {listed}."
 
 

@@ -125,7 +125,7 @@ def inclination_svg(activity: ActivityResult, day: DayTotals) -> str:
 def bouts_svg(bins: Sequence[BoutBin]) -> str:
     """Draw the number of walking bouts by length."""
     bars = [(b.label, float(b.bouts), True) for b in bins]
-    return bars_svg(bars, "Walking bouts by length; the table has the numbers", height=150)
+    return bars_svg(bars, "Walking bouts by length; values in the table", height=150)
 
 
 def steps_svg(activity: ActivityResult, days: Sequence[DayTotals]) -> str:
@@ -135,12 +135,12 @@ def steps_svg(activity: ActivityResult, days: Sequence[DayTotals]) -> str:
             (d.label, float(own.steps) if own.worn_h > 0.0 else None, d.counted)
             for d, own in zip(days, activity.days, strict=True)
         ]
-        return bars_svg(bars, "Steps per day; the table has the numbers", height=150)
+        return bars_svg(bars, "Steps per day; values in the table", height=150)
     counts = np.zeros(24)
     for h in activity.hours:
         counts[int((h.start_s - days[0].midnight_s) // 3600) % 24] += h.steps
     hours = [(str(i) if i % 3 == 0 else "", float(n), True) for i, n in enumerate(counts.tolist())]
-    return bars_svg(hours, "Steps per hour; the table has the numbers", height=150, values=False)
+    return bars_svg(hours, "Steps per hour; values in the table", height=150, values=False)
 
 
 def bars_svg(

@@ -208,7 +208,7 @@ def daily_life_view(activity: ActivityResult | None) -> DailyLifeView | None:
             sum(b.stairs_down_steps for b in activity.bouts),
         ),
         leans=leans,
-        lean_reason=None if leans else "not known: no lean of the trunk showed which way is forward",
+        lean_reason=None if leans else "unknown: no trunk lean showed the forward direction",
     )
 
 
@@ -311,7 +311,7 @@ def _describe_event(activity: ActivityResult, e: PosturalTransition | Transition
     if isinstance(e, TransitionCandidate):
         label = "" if e.likely is None else f"{TRANSITION_LABELS[e.likely]}?"
         return TransitionEvent(when, label or DASH, lean, rise, REFUSALS[e.refused], counts=False)
-    status = "counts" if e.consistent else "counts, but the posture before it does not fit"
+    status = "included" if e.consistent else "counted, but inconsistent with the preceding posture"
     return TransitionEvent(when, TRANSITION_LABELS[e.kind], lean, rise, status, counts=True)
 
 

@@ -37,16 +37,16 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("retention", "Retention test, first strides", False),
     ("with", "With feedback", False),
     ("without", "Without feedback", False),
-    ("probe", "of these in probe blocks", True),
-    ("faded", "of these left out by the schedule", True),
-    ("off", "of these while off, paused or stale", True),
-    ("stopped", "of these after the end", True),
+    ("probe", "of these, in probe blocks", True),
+    ("faded", "of these, without feedback by schedule", True),
+    ("off", "of these, while off, paused or without current data", True),
+    ("stopped", "of these, after the end", True),
 )
 """Kind of stride, its words, and whether it is a part of the one above."""
 
 _HOW_TO_READ: Final = (
-    "Values are those of the finished analysis, the zone is that of the level at that stride. Only strides "
-    "without feedback show what stays when it goes."
+    "Values are from the completed analysis; the zone is that of the level at each stride. Only strides "
+    "without feedback show what is retained."
 )
 
 
@@ -165,15 +165,16 @@ def feedback_view(
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     """Explanations, and data that could not be used."""
-    notes = [_HOW_TO_READ, f"Side effects: the last {LAST} strides against the first {FIRST} of the take."]
+    notes = [_HOW_TO_READ, f"Side effects: the last {LAST} strides vs the first {FIRST} of the trial."]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
         notes.append(
-            f"What was fed back differed from the analysis by {format_number(live.mean, term.digits + 1)} ± "
+            "Live feedback values differed from the analysis by "
+            f"{format_number(live.mean, term.digits + 1)} ± "
             f"{format_quantity(live.sd, term, term.digits + 1)}."
         )
-    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "a stride that does not count")):
+    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "an excluded stride")):
         if n:
-            cues = plural(n, "1 cue, left out, has", f"{n} cues, left out, have")
+            cues = plural(n, "1 cue, excluded, has", f"{n} cues, excluded, have")
             notes.append(f"{cues} {outcome} in the analysis.")
     return tuple(notes)

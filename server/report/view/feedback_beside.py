@@ -26,10 +26,10 @@ from sagittal.server.report.words.feedback_words import digits_of, format_quanti
 from sagittal.server.report.words.wording import Term
 
 EFFECT_REASONS: Final = {
-    "too_few_strides": f"needs {FIRST} strides at the start and {FIRST} after them, on this side",
-    "joint_missing": "needs the joint angles of both legs",
+    "too_few_strides": f"requires {FIRST} strides at the start and {FIRST} afterwards on this side",
+    "joint_missing": "requires joint angles of both legs",
     "both_sides_trained": "both sides are trained",
-    "no_limit": "no limit is prescribed",
+    "no_limit": "no limit prescribed",
 }
 
 
@@ -110,7 +110,9 @@ def describe_effects(content: Prescription, guard: GuardState, term: Term) -> tu
 def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffectRow:
     if effect.change is None:
         explanation = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
-        return SideEffectRow(name, label, "none", None, None, None, NO_STRIDES, f"not judged: {explanation}")
+        return SideEffectRow(
+            name, label, "none", None, None, None, NO_STRIDES, f"not assessed: {explanation}"
+        )
     text = format_signed(effect.change, term)
     if effect.limit is None:
         return SideEffectRow(
@@ -132,7 +134,7 @@ def compare_retention(
     difference = now.mean - end.mean
     limit = find_detectable_change(content.parameter, end.mean, limb)
     if limit is None:
-        verdict = "no measurement error of this parameter is known"
+        verdict = "the measurement error of this parameter is unknown"
     elif abs(difference) <= limit.value:
         verdict = f"within the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
     else:

@@ -159,15 +159,20 @@ def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
             )
             return f"{filters} on {devices}: their {words} differs by {values.strip()} (standard deviation)."
     if ran == 1:
-        return f"{filters} on {devices}: it has no other to differ from. It is held against Sagittal's own."
+        return (
+            f"{filters} on {devices}: there is no other filter to compare with, so it is compared with "
+            "Sagittal's own."
+        )
     return f"{filters} on {devices}."
 
 
 def _notes(data: Mapping[str, Any], has_cycles: bool) -> list[str]:
-    used = "used where a filter can" if data["magnetometer"] else "not used"
+    used = "used by filters that support it" if data["magnetometer"] else "not used"
     cycle_counts = " and ".join(f"{data['strides'].get(side, 0)} {side}" for side in SIDES)
     cycles = (
-        f"Over the gait cycle: {cycle_counts} strides." if has_cycles else "No stride counts: over time only."
+        f"Over the gait cycle: {cycle_counts} strides."
+        if has_cycles
+        else "No strides included: over time only."
     )
     return [f"Magnetometer: {used}. {cycles}"]
 

@@ -39,9 +39,9 @@ require_entries(TOTALS, "sagittal.server.report.view.functional")
 
 SEGMENTS: Final[Mapping[str, str]] = {
     "sit_to_stand": "Rising",
-    "walk_out": "Way out",
+    "walk_out": "Walk out",
     "turn": "Turn",
-    "walk_back": "Way back",
+    "walk_back": "Walk back",
     "turn_to_sit": "Turn and sitting down",
     "stand_to_sit": "Sitting down",
     "speeding_up": "Speeding up",
@@ -54,16 +54,16 @@ SEGMENTS: Final[Mapping[str, str]] = {
 MEANT: Final[Mapping[str, str]] = {
     "tug_duration_s": "From the first lean forward to the end of sitting down.",
     "five_sit_to_stand_s": "From the first lean forward to the end of the fifth sitting down.",
-    "walk_10m_speed_mps": "Over the middle of the longest straight walk, two metres at either end left out.",
-    "walk_6min_distance_m": "By the strides of the feet, turns included.",
-    "sway_rms_mps2": "Of the horizontal acceleration below 3.5 Hz; which way is forward is not known.",
+    "walk_10m_speed_mps": "Over the middle of the longest straight walk, excluding two metres at each end.",
+    "walk_6min_distance_m": "From the strides of the feet, turns included.",
+    "sway_rms_mps2": "From the horizontal acceleration below 3.5 Hz; the forward direction is unknown.",
 }
 """How the total of a test is meant."""
 
-TEST_NORM_NOTE: Final = "The norm of a test, where there is one, stands below its segments."
+TEST_NORM_NOTE: Final = "If a norm exists for the test, it is shown below its phases."
 """Below the table of a test's parameters."""
 
-NO_NORM: Final = "No norm: none whose source gives figures for this test."
+NO_NORM: Final = "No norm: no published values for this test."
 NO_AGE: Final = "No norm: enter the year of birth."
 NO_SEX: Final = "No norm: enter the sex."
 OTHER_AGE: Final = "No norm for this age."

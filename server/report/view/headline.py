@@ -178,11 +178,11 @@ def say_badge(kind: str, strides: Strides) -> str:
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    count_text = f"{count} {plural(count, 'stride', 'strides')} used, {left} left and {right} right"
+    count_text = f"{count} {plural(count, 'stride', 'strides')} included, {left} left and {right} right"
     if min(left, right) < COMPARED and strides.strides:
-        return f"{count_text}: fewer than {COMPARED} of a side are compared with nobody."
+        return f"{count_text}: at least {COMPARED} per side are needed for a comparison."
     if not strides.strides:
-        return "Steps are told by the trunk; sides are not compared."
+        return "Steps are from the trunk sensor; sides are not compared."
     return f"{count_text}."
 
 

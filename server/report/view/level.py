@@ -17,12 +17,12 @@ from sagittal.core.subject.standing_angles import JOINTS, PELVIS
 from sagittal.server.report.view.table import ParameterRow, parameter_rows
 from sagittal.server.report.words.wording import title_of
 
-GROUP = "Angles from the anatomical zero"
+GROUP = "Angles from neutral (0°)"
 
-STANDING: Final = "from the person's own standing"
+STANDING: Final = "relative to standing"
 """Words of definitions that do not hold for an anatomical angle."""
 
-ANATOMICAL: Final = "from the anatomical zero"
+ANATOMICAL: Final = "from neutral (0°)"
 """Words in their place."""
 
 _SUFFIX: Final = "_anatomical_deg"

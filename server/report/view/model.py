@@ -380,7 +380,7 @@ def _norm_note(bundle: Bundle) -> str | None:
     if _is_told_by_trunk(bundle):
         return TEST_NORM_NOTE
     if bundle.activity is not None:
-        return "Daily life is held against no norm."
+        return "Daily life is not compared with a norm."
     return NORM_NOTE if bundle.repetitions is not None else None
 
 

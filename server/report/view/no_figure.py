@@ -7,16 +7,16 @@ from typing import Final
 from sagittal.server.report.files.bundle import Bundle
 from sagittal.server.report.words.wording import speak_places
 
-FEW_SENSORS: Final = "it needs sensors on the pelvis and a leg, on pelvis and feet or on both feet."
-OF_A_TEST: Final = "of a test only its times and values are measured."
-OF_DAYS: Final = "of daily life only what was done, and when, is measured."
+FEW_SENSORS: Final = "this requires sensors on the pelvis and a leg, on the pelvis and feet, or on both feet."
+OF_A_TEST: Final = "only times and values are measured in a test."
+OF_DAYS: Final = "in daily life only activities and their times are measured."
 
 
 def explain_no_figure(bundle: Bundle) -> str:
     """Reason in one sentence why an analysis has no poses: it stopped, its protocol, or its sensors."""
     stopped = next((n.message for n in bundle.warnings if n.severity == "error"), None)
     if stopped is not None:
-        return f"This take has no figure: the analysis stopped before it. {speak_places(stopped)}"
+        return f"No avatar for this trial: the analysis stopped before it. {speak_places(stopped)}"
     if bundle.functional is not None:
-        return f"This take has no figure: {OF_A_TEST}"
+        return f"No avatar for this trial: {OF_A_TEST}"
     return f"This take has no figure: {FEW_SENSORS if bundle.activity is None else OF_DAYS}"

@@ -77,9 +77,9 @@ def _matched_note(norms: Norms) -> str:
 def _own_note(controls: ControlGroup) -> str:
     """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
-        return f"Own controls who walk as fast: {controls.n}, too few to compare with."
+        return f"Own controls at the same speed: {controls.n}, too few for a comparison."
     small = ", a small group" if controls.note == "small_group" else ""
-    return f"Where no published norm compares: {controls.group}, {controls.n} people{small}."
+    return f"Where no published norm is comparable: {controls.group}, {controls.n} people{small}."
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
@@ -99,17 +99,18 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     about_zero = []
     if any(p.zero == "standing" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves named from standing have the posture of the standing part at 0°. "
-            f"Subtracted: {', '.join(offsets)}. A person who stands bent gets curves shifted by that much."
+            "Curves relative to standing have the posture during quiet standing at 0°. Subtracted: "
+            f"{', '.join(offsets)}. If the person stands with flexed joints, the curves are offset by "
+            "that amount."
         )
     if any(p.zero == "walking" and p.reason is None for p in panels):
         about_zero.append(
-            "Nobody stood still in this take: these curves start from their own mean in straight walking. "
-            "Read their shape and range; they have no level."
+            "No quiet standing in this trial: these curves are relative to their own mean in straight "
+            "walking. Interpret shape and range only; they have no absolute level."
         )
     if any(p.zero == "anatomical" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves named anatomical start from what the goniometer read in standing, as the norm does."
+            "Curves from neutral use the goniometer angles in standing as reference, like the norm."
         )
     view = estimator_view(bundle.estimator)
     notes = [
@@ -122,7 +123,8 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     most = max((c.n for p in panels for c in p.sides.values()), default=0)
     if most > drawn:
         notes.append(
-            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the take; means are of all."
+            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the trial; means include all "
+            "strides."
         )
     return tuple(notes)
 
@@ -134,7 +136,7 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         for p in panels
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
-    reason = "interrupted where the leg model's knee rests on its limit in most strides"
+    reason = "interrupted where the knee of the leg model is at its limit in most strides"
     return [f"{', '.join(broken).capitalize()}: {reason}; nothing is measured there."] if broken else []
 
 

@@ -221,8 +221,8 @@ def _index(scores: Scores) -> str:
         if s.value is not None:
             parts.append(f"{side} {format_number(s.value)}")
     return (
-        f"GDI*, sagittal: {', '.join(parts)} (100 is the middle of healthy adults at their own speed, "
-        "10 is one SD)."
+        f"GDI*, sagittal: {', '.join(parts)} (100: mean of healthy adults at their own speed; 10 points: "
+        "one SD)."
         if parts
         else ""
     )
@@ -232,7 +232,7 @@ def _note(scores: Scores) -> str:
     gps = scores.find("gps_deg", MODE, "left")
     missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
     without = (
-        f"There is no GPS: {', '.join(missing)} ({reason_words(gps.reason)})."
+        f"GPS not available: {', '.join(missing)} ({reason_words(gps.reason)})."
         if gps.value is None and missing
         else ""
     )
@@ -242,8 +242,8 @@ def _note(scores: Scores) -> str:
         else f"{scores.reference_n} healthy adults at their own comfortable speed"
     )
     measured = (
-        f"Root mean square distance of each mean curve from that of {people}. The level of each curve is "
-        "removed, because angles start from the person's standing. Dark to the 75th, light to the 95th "
-        "percentile of these adults, their median as a line."
+        f"Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
+        "removed because angles are relative to the person's standing. Dark: up to the 75th, light: up "
+        "to the 95th percentile of these adults; line: median."
     )
     return " ".join(filter(None, (measured, without, f"{scores.source}.")))

@@ -19,17 +19,17 @@ from sagittal.server.report.words.wording import format_number, place_words, spe
 CALIBRATION_METHODS: Final[Mapping[str, str]] = {
     "walking_direction": "from standing and walking",
     "gyro_pca": "from leg rotation",
-    "declared": "mounting as declared",
-    "neighbour": "guessed from neighbours",
-    "fixed_offset": "put on as agreed",
-    "table_top": "carried from a table",
-    "hip_swing": "from swings of the leg",
-    "trunk_bow": "from bows of the trunk",
+    "declared": "declared placement",
+    "neighbour": "inferred from adjacent segments",
+    "fixed_offset": "placed according to protocol",
+    "table_top": "transferred from a table",
+    "hip_swing": "from leg swings",
+    "trunk_bow": "from trunk bows",
 }
 """Method of a calibration → words."""
 
 NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
-IN_DOUBT: Final = "Numbers are withheld or in doubt."
+IN_DOUBT: Final = "Some values are not reported or are unreliable."
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ def data_verdict(
     if level == "poor":
         return "bad", "Poor data" if estimator is None or health != "bad" else _name_bad_estimate(estimator)
     if level == "usable" or "warning" in severities:
-        return "warn", "Usable, see notices"
+        return "warn", "Usable with caution"
     if daily is not None and not daily.n:
         return "warn", "No complete day"
     return "ok", "Good data"
@@ -164,7 +164,7 @@ def data_verdict(
 def _name_bad_estimate(estimator: Mapping[str, Any]) -> str:
     """The inconsistency: between sensors, or between a foot's path and its rest periods."""
     bad = [f["name"] for f in estimator.get("health", ()) if f["verdict"] == "bad"]
-    return "Foot path in doubt" if concern_paths_alone(bad) else "Sensors disagree"
+    return "Foot path unreliable" if concern_paths_alone(bad) else "Sensors disagree"
 
 
 def _trunk_steps(parameters: Sequence[Parameter]) -> int:
@@ -198,7 +198,7 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
         return [
             QualityItem("Worn", f"{format_number(hours, 1)}\u202fh"),
             QualityItem(
-                "Days that count", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
+                "Days included", f"{0 if whole is None else whole.n} of {days}", "worn 10 h or longer"
             ),
         ]
     if is_test(bundle.parameters) and not bundle.strides.strides:
@@ -207,7 +207,7 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     if squats:
         done = [p for p in squats if p.n] or squats
         if len(done) == 1:
-            return [QualityItem("Squats used", str(done[0].n), f"{done[0].side} leg")]
+            return [QualityItem("Squats included", str(done[0].n), f"{done[0].side} leg")]
         return [_squats_of_both(bundle)]
     steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
@@ -219,7 +219,7 @@ def _squats_of_both(bundle: Bundle) -> QualityItem:
     own = [r for r in bundle.repetitions or () if r.excluded != FOOT_LIFTED]
     left, right = ([r for r in own if r.side == side] for side in ("left", "right"))
     return QualityItem(
-        "Squats used",
+        "Squats included",
         sides=True,
         left=sum(r.excluded is None for r in left),
         left_of=len(left),
@@ -231,7 +231,7 @@ def _squats_of_both(bundle: Bundle) -> QualityItem:
 def _strides(bundle: Bundle) -> QualityItem:
     left, right = ([s for s in bundle.strides.strides if s.side == side] for side in ("left", "right"))
     return QualityItem(
-        "Strides used",
+        "Strides included",
         sides=True,
         left=sum(s.excluded_reason is None for s in left),
         left_of=len(left),
@@ -292,7 +292,9 @@ def _estimator(section: Mapping[str, Any] | None) -> list[QualityItem]:
         return []
     extra = view.reduced or view.verdict
     kind = None if view.kind == "ok" and view.reduced is None else view.kind
-    return [QualityItem("Poses by", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")]
+    return [
+        QualityItem("Pose estimator", view.name, extra, kind="warn" if kind == "ok" else kind, page="data")
+    ]
 
 
 def _sensor_name(sensor: Mapping[str, Any]) -> str:

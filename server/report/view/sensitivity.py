@@ -46,7 +46,7 @@ SHOWN: Final[Mapping[str, str]] = {
 
 GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
     (
-        "Direction of a sensor",
+        "Sensor alignment",
         {
             "Roll-tib": "Shin, about the bone",
             "Pitch-tib": "Shin, to the side",
@@ -60,28 +60,28 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
         },
     ),
     (
-        "Place of a sensor",
+        "Sensor position",
         {
             "LTib2Knee": "Shin sensor to knee",
             "Zr3S": "Shin sensor inward",
-            "CTib": "Circumference of the calf",
+            "CTib": "Calf circumference",
             "LThi2Knee": "Thigh sensor to knee",
             "Zr4S": "Thigh sensor inward",
-            "CThi": "Circumference of the thigh",
+            "CThi": "Thigh circumference",
         },
     ),
     (
-        "Body",
+        "Body dimensions",
         {
-            "Ltibia": "Length of the shank",
+            "Ltibia": "Shank length",
             "Yr3": "Knee forward of the shank's axis",
             "Zr3": "Knee inward of it",
-            "Lthigh": "Length of the thigh",
+            "Lthigh": "Thigh length",
             "Yr4": "Hip forward of the thigh's axis",
             "Zr4": "Hip inward of it",
-            "PW": "Width of the pelvis",
-            "PD": "Depth of the pelvis",
-            "LL": "Length of the leg",
+            "PW": "Pelvis width",
+            "PD": "Pelvis depth",
+            "LL": "Leg length",
         },
     ),
 )
@@ -193,7 +193,7 @@ def tell_sensitivity(summary: Mapping[str, Any]) -> list[str]:
             lines.append(title)
             lines += _layout(COLUMNS, [(r["name"], _texts(r[member], every, (), 3)) for r in leg["rows"]])
     if any(row["reason"] for leg in summary["legs"] for row in leg["rows"]):
-        lines.append("– : nominal value 0 or near a pole; nothing can be a share of it off.")
+        lines.append("– : nominal value 0 or near a singularity; no relative change is defined.")
     lines.append("Tables: docs/science/squat.md. A quotient by an error below 0.1° is not given.")
     return lines
 
@@ -276,7 +276,7 @@ class SensitivityView:
 
 REASONS: Final[Mapping[str | None, str]] = {
     "parameter_nominal_zero": "its nominal value is 0",
-    "gimbal": "near a pole of its angles",
+    "gimbal": "near a singularity of its angles",
 }
 
 
@@ -310,8 +310,8 @@ def _speak(data: Mapping[str, Any]) -> Iterator[str]:
         f"{format_number(turn[0], 1)}° ({turn[1]})."
     )
     yield (
-        f"A sensor {data['step_mm']:g} mm off its place: up to {format_number(place[0], 2)}°. A measure of "
-        f"the body {data['step_mm']:g} mm off: up to {format_number(body[0], 2)}°."
+        f"A sensor displaced by {data['step_mm']:g} mm: up to {format_number(place[0], 2)}°. A body "
+        f"dimension off by {data['step_mm']:g} mm: up to {format_number(body[0], 2)}°."
     )
 
 

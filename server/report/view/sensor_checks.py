@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from sagittal.server.report.words.wording import format_number, place_words
 
-NOT_JUDGED: Final = "cannot be judged"
+NOT_JUDGED: Final = "cannot be assessed"
 
 
 @dataclass(frozen=True)
@@ -46,18 +46,21 @@ def sensor_checks(checks: Mapping[str, Any] | None) -> SensorChecks | None:
     notes = []
     if any(s["sensor"] == "pelvis" for s in unclear):
         notes.append(
-            "A slip of the pelvis sensor cannot be seen: in walking its hips move by ± 10° anyway. "
-            "Compare hip angles with care if its belt was loose."
+            "A slip of the pelvis sensor cannot be detected, because hip angles vary by ± 10° in walking "
+            "anyway. Interpret hip angles with care if the belt was loose."
         )
     if any(s["sensor"] != "pelvis" for s in unclear):
         notes.append(
-            "That a sensor stayed is said where a slip would have been seen for most of the walk. Stand "
-            "still before and after it, or walk for longer."
+            "A sensor is reported as stable only if a slip would have been detectable during most of the "
+            "walk. Stand still before and after the walk, or walk for longer."
         )
     if not all(s["clock_judged"] for s in checks["sensors"]):
-        notes.append("A clock is judged where a neighbour across a hip, knee or ankle is worn, in walking.")
+        notes.append(
+            "A clock can be checked in walking if an adjacent segment across the hip, knee or ankle has "
+            "a sensor."
+        )
     if len(unclear) < len(checks["sensors"]):
-        notes.append("Straps that loosen slowly, and a second slip of a sensor, are not found.")
+        notes.append("Slowly loosening straps and a second slip of the same sensor are not detected.")
     return SensorChecks(rows, "; ".join(pairs), tuple(notes))
 
 
@@ -66,18 +69,18 @@ def _row(s: Mapping[str, Any]) -> SensorCheck:
 
 
 def _clock(s: Mapping[str, Any]) -> tuple[str, str]:
-    done = "put right" if s["shifted"] else "left so"
+    done = "corrected" if s["shifted"] else "not corrected"
     if s["drift_ms"] is not None:
         which = "slow" if s["drift_ms"] > 0 else "fast"
         return (
-            f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the take, {done}",
+            f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the trial, {done}",
             "warn",
         )
     if s["lag_ms"] is not None:
         which = "late" if s["lag_ms"] > 0 else "early"
         return f"Clock {format_number(abs(s['lag_ms']))}\u202fms {which}, {done}", "warn"
     if s.get("clock_doubted"):
-        return "Clock seems wrong, see notices", "warn"
+        return "Clock appears wrong, see notices", "warn"
     return ("Clock agrees", "ok") if s["clock_judged"] else (f"Clock {NOT_JUDGED}", "")
 
 
@@ -89,6 +92,6 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
         )
     # an older version did not say from when to when it could judge
     if (duration_s := s.get("place_judged_s")) is None:
-        return f"Place {NOT_JUDGED}", ""
+        return f"Placement {NOT_JUDGED}", ""
     start, end = (format_number(x) for x in duration_s)
     return f"Stayed from {start} to {end}\u202fs", "ok"

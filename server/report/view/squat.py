@@ -36,7 +36,7 @@ VARIABLES: Final = (
 )
 """Charts of a squat; the knee bends further than in walking, so the axes are their own."""
 
-NORM_NOTE: Final = "Squats have no norm."
+NORM_NOTE: Final = "There is no norm for squats."
 
 SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
 """Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
@@ -106,7 +106,7 @@ class SquatView:
         legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
         if not legs:
             return ""
-        return f"Bends with the foot off the floor are no squats: {' and '.join(legs)}."
+        return f"Knee flexion with the foot off the floor is not counted as a squat: {' and '.join(legs)}."
 
     def to_json(self) -> dict[str, object]:
         """Content of the report's JSON; curves are in angles.parquet, values in repetitions.csv."""
@@ -206,7 +206,7 @@ def _panel(variable: Variable, curves: Mapping[Side, Mapping[str, Floats]]) -> C
         zero="standing",
         added_deg={},
         low_confidence=variable.name not in SURE,
-        reason=None if sides else "not known throughout any squat",
+        reason=None if sides else "not available throughout any squat",
         norm=None,
         norm_note="",
         sides=sides,

@@ -36,7 +36,7 @@ NOBODY: Final = Norms(None, None)
 """No reference people at all."""
 
 
-FEW_NOTE: Final = f"No norm: fewer than {COMPARED} strides of a side are compared with nothing."
+FEW_NOTE: Final = f"No norm: at least {COMPARED} strides per side are needed for a comparison."
 """What stands in place of a norm where no side has enough strides."""
 
 

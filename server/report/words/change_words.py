@@ -18,18 +18,18 @@ VERDICTS: Final[Mapping[str, str]] = {
 }
 """Verdict → words (docs/science/change.md, "Verdict")."""
 
-NO_LIMIT: Final = "no measurement error known"
-SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no limit known"}
+NO_LIMIT: Final = "measurement error unknown"
+SHORT: Final[Mapping[str, str]] = {NO_LIMIT: "no known limit"}
 TOO_FEW_WORDS: Final = "too few strides to compare"
 NOT_ALIKE_WORDS: Final = "not compared: one is measured, the other estimated"
-UNLIKE_WORDS: Final = "not judged, the conditions differ"
+UNLIKE_WORDS: Final = "not assessed: the conditions differ"
 
 SCORE_TERMS: Final[Mapping[str, Term]] = {
     "gps_sagittal_deg": Term(
-        "Sagittal profile score", "°", "Distance from healthy adults", 1, (0, 20), ("larger", "smaller")
+        "Sagittal profile score", "°", "Deviation from healthy adults", 1, (0, 20), ("larger", "smaller")
     ),
     "gdi_star_sagittal": Term(
-        "GDI*, sagittal", "points", "Distance from healthy adults", 0, (40, 120), ("larger", "smaller")
+        "GDI*, sagittal", "points", "Deviation from healthy adults", 0, (40, 120), ("larger", "smaller")
     ),
 }
 """Scores that are followed over visits, after the parameters: shape of the curves, offsets removed."""
@@ -59,7 +59,7 @@ class ChangeWords:
         """The assessment in two words, if possible."""
         if self.mark in {"up", "down"}:
             return "changed"
-        return "within error" if not self.mark else SHORT.get(self.verdict, self.verdict)
+        return "within measurement error" if not self.mark else SHORT.get(self.verdict, self.verdict)
 
 
 def find_term(name: str, unit: str = "") -> Term:
@@ -119,5 +119,5 @@ def _verdict(change: Change) -> str:
     if change.verdict != "within_measurement_error" and change.towards_norm is not None:
         text += ", towards the norm" if change.towards_norm else ", away from the norm"
     if change.note == "from_standing":
-        text += "; includes how the person stood"
+        text += "; includes the standing posture"
     return text

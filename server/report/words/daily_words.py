@@ -31,14 +31,14 @@ KIND_LABELS: Final[Mapping[ActivityKind, str]] = {
 }
 
 KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
-    "lying": "the trunk is more than 70° from upright and holds still",
+    "lying": "trunk more than 70° from upright and still",
     "sitting": "after a stand-to-sit or before a sit-to-stand, no steps",
     "standing": "after a sit-to-stand, before a stand-to-sit, or between walks, no steps",
-    "walking": "steps in a row, on the level",
-    "stairs_up": "experimental: walking with the trunk leaning forward and rocking",
-    "stairs_down": "experimental: walking with the trunk rocking strongly; most are missed",
-    "unknown": "worn, but the signals contradict each other or say nothing",
-    "non_wear": "no movement for half an hour or longer, not even breathing",
+    "walking": "consecutive steps on level ground",
+    "stairs_up": "experimental: walking with forward trunk inclination and sway",
+    "stairs_down": "experimental: walking with strong trunk sway; most are missed",
+    "unknown": "worn, but the signals are contradictory or inconclusive",
+    "non_wear": "no movement for at least half an hour, not even breathing",
     "gap": "the device stored no samples",
 }
 """How each kind is told, in the words of its definition (docs/science/activity.md)."""
@@ -64,10 +64,10 @@ TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
 }
 
 REFUSALS: Final[Mapping[TransitionRefusal, str]] = {
-    "lean_below_limit": "below the limit: the trunk leaned less than 20°",
-    "chest_did_not_rise": "a bow: the chest did not rise or fall enough",
-    "direction_unclear": "up or down is not clear",
-    "near_lying": "belongs to lying down or getting up",
+    "lean_below_limit": "below the limit: trunk inclination less than 20°",
+    "chest_did_not_rise": "a bow: insufficient rise or fall of the chest",
+    "direction_unclear": "direction unclear",
+    "near_lying": "part of lying down or getting up",
     "while_walking": "amid walking",
 }
 

@@ -14,9 +14,9 @@ from sagittal.server.report.words.wording import format_number
 from sagittal.web.words import day
 
 NOT_MEASURED: Final = {
-    "no_rest": "It was never at rest for a second. Let the person stand still at the start.",
-    "no_gyroscope": "It sent no rate of turn.",
-    "unit_suspect": "What it reads at rest cannot be gravity. Check the unit of the export.",
+    "no_rest": "It was never still for one second. Ask the person to stand still at the start.",
+    "no_gyroscope": "It sent no angular rate.",
+    "unit_suspect": "Its reading at rest is not gravity. Check the unit of the export.",
 }
 """Reason of a check → a sentence."""
 
@@ -24,8 +24,8 @@ ADVICE: Final = {
     "gyro_bias": "Let it warm up for ten minutes and record again; if it stays, recalibrate it.",
     "scale": "Let it warm up for ten minutes and record again; if it stays, recalibrate its accelerometer.",
     "scale_off": "Recalibrate its accelerometer.",
-    "gyro_noise": "Check strap and case. A trembling wearer does this too.",
-    "acc_noise": "Check strap and case. A trembling wearer does this too.",
+    "gyro_noise": "Check strap and case. Tremor of the wearer has the same effect.",
+    "acc_noise": "Check strap and case. Tremor of the wearer has the same effect.",
 }
 """Quantity of a finding → what to do."""
 
@@ -60,7 +60,7 @@ def judge_device(
         reasons = [f"{text}{ADVICE[f.quantity]}" for text, f in zip(prefixes, course.findings, strict=True)]
         return DeviceVerdict("warn", texts[0], (*reasons, *late))
     if course.compared == 0:
-        return DeviceVerdict("none", "First check", ("There is nothing to compare with yet.", *late))
+        return DeviceVerdict("none", "First check", ("Nothing to compare with yet.", *late))
     return DeviceVerdict("ok", "Steady", late)
 
 

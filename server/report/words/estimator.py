@@ -18,38 +18,42 @@ from sagittal.core.estimators import (
 from sagittal.server.report.words.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
-VERDICTS: Final[Mapping[str, str]] = {"good": "consistent", "warn": "doubtful in part", "bad": "inconsistent"}
-NOT_JUDGED: Final = "does not check itself"
+VERDICTS: Final[Mapping[str, str]] = {
+    "good": "consistent",
+    "warn": "partly unreliable",
+    "bad": "inconsistent",
+}
+NOT_JUDGED: Final = "has no self-check"
 """Of an estimator that has no quantity with a limit."""
 
 REDUCED: Final[Mapping[str, str]] = {
-    "sensor_failed": "reduced: a sensor failed in this take",
-    "not_calibrated": "reduced: which way a sensor faces is not known",
-    "no_standing": "none: no usable standing in this take",
-    "estimator_failed": "reduced: the better estimator could not finish",
+    "sensor_failed": "reduced: a sensor failed in this trial",
+    "not_calibrated": "reduced: the facing direction of a sensor is unknown",
+    "no_standing": "none: no usable quiet standing in this trial",
+    "estimator_failed": "reduced: the preferred estimator could not finish",
 }
 
 QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
-    "joint_residual_mm": ("Joint ends apart", 0, "mm"),
-    "zero_velocity_refused_pct": ("Rests refused", 1, "%"),
-    "contact_pct": ("Foot at rest, of the take", 0, "%"),
-    "longest_moving_s": ("Longest without rest", 1, "s"),
-    "climb_pct": ("Floor rises or falls, of the way", 1, "%"),
-    "gap_s": ("Longest loss", 1, "s"),
-    "start_heading_off_deg": ("First heading off", 0, "°"),
-    "heading_sd_deg": ("Heading uncertain by", 1, "°"),
+    "joint_residual_mm": ("Joint separation", 0, "mm"),
+    "zero_velocity_refused_pct": ("Rejected foot-flat periods", 1, "%"),
+    "contact_pct": ("Foot-flat, share of the trial", 0, "%"),
+    "longest_moving_s": ("Longest time without foot-flat", 1, "s"),
+    "climb_pct": ("Floor inclination, share of the distance", 1, "%"),
+    "gap_s": ("Longest data loss", 1, "s"),
+    "start_heading_off_deg": ("Initial heading error", 0, "°"),
+    "heading_sd_deg": ("Heading uncertainty", 1, "°"),
     "min_eigenvalue": ("Smallest eigenvalue of P", 0, ""),
-    "forward_axis_turned_deg": ("Forward axis turned", 0, "°"),
-    "leg_excess_mm": ("Leg longer than it is", 1, "mm"),
-    "hinge_mm": ("Joint off its hinge", 1, "mm"),
-    "knee_straight_pct": ("Knee straight", 0, "%"),
-    "foot_turned_deg": ("Foot sensor turned", 0, "°"),
+    "forward_axis_turned_deg": ("Anterior axis rotated", 0, "°"),
+    "leg_excess_mm": ("Leg over-extended", 1, "mm"),
+    "hinge_mm": ("Hinge violation", 1, "mm"),
+    "knee_straight_pct": ("Knee fully extended", 0, "%"),
+    "foot_turned_deg": ("Foot sensor rotated", 0, "°"),
     "feet_out_of_place_pct": ("Feet not under the hips", 0, "%"),
-    "phase_off_pct": ("Feet out of step by", 0, "% of a stride"),
-    "toward_foot_mps2": ("Pelvis falls toward the standing foot", 2, "m/s²"),
-    "inner_foot_m": ("Inner foot ahead in turns; up to the limit, sides are undecided", 2, "m/rad"),
-    "pelvis_rise_cm": ("Pelvis rises and sinks by", 0, "cm"),
-    "places_moved_mm": ("Places still moving by", 1, "mm"),
+    "phase_off_pct": ("Deviation from alternation", 0, "% of a stride"),
+    "toward_foot_mps2": ("Pelvis acceleration towards the stance foot", 2, "m/s²"),
+    "inner_foot_m": ("Inner foot ahead in turns; sides undecided up to the limit", 2, "m/rad"),
+    "pelvis_rise_cm": ("Vertical pelvis excursion", 0, "cm"),
+    "places_moved_mm": ("Residual position change", 1, "mm"),
     "pelvis_tilt_sd_deg": ("Pelvis tilt, standard deviation", 1, "°"),
 }
 """Name of a finding → label, decimals, unit."""
@@ -109,7 +113,7 @@ def estimator_view(e: Mapping[str, Any] | None) -> EstimatorView | None:
         reduced=None if reduced is None else REDUCED.get(reduced, str(reduced)),
         health=_rows(e["health"]),
         choices=(
-            (AUTO, "Automatic: the best for what is worn", requested == AUTO),
+            (AUTO, "Automatic: best for the sensors in use", requested == AUTO),
             *((x, choice_label(x), requested == x) for x in e["possible"]),
         ),
         estimated=_estimated(_told(list_estimated_angles(e), name)),

@@ -84,12 +84,12 @@ def schedule_words(content: Prescription) -> str:
     if s.probe_every is not None:
         text += f"; after every {s.probe_every}, {s.probe_strides} without"
     if s.retention_strides:
-        text += f"; a visit after a training begins with {s.retention_strides} without"
+        text += f"; a visit after a training starts with {s.retention_strides} without"
     return text
 
 
 def _zone(content: Prescription) -> str:
-    return f"target ± {content.band_sd:g} SD; one level is {content.progression.sd_per_level:g} SD wider"
+    return f"target ± {content.band_sd:g} SD; each level is {content.progression.sd_per_level:g} SD wider"
 
 
 def _shown(content: Prescription) -> str:
@@ -101,12 +101,12 @@ def _shown(content: Prescription) -> str:
 
 def _level(content: Prescription) -> str:
     p = content.progression
-    start = "as hard as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
+    start = "as difficult as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
     if not p.automatic:
-        return f"begins {start}; changed by hand"
+        return f"starts {start}; changed manually"
     return (
-        f"begins {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
-        f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off"
+        f"starts {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
+        f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off target"
     )
 
 
@@ -119,7 +119,7 @@ def _ends(content: Prescription) -> str:
         conditions.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
     if r.gps_rise_deg is not None:
         conditions.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
-    return ", ".join(conditions) or "when the therapist ends it"
+    return ", ".join(conditions) or "when the therapist stops it"
 
 
 def _watched(content: Prescription) -> str:

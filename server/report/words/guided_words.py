@@ -15,7 +15,7 @@ TOTAL: Final[Mapping[str, str]] = {
 }
 """Guided protocol → the figure that stands for it."""
 
-_UPRIGHT: Final = "The time has begun. Keep standing still."
+_UPRIGHT: Final = "The test has started. Keep standing still."
 
 SAYS: Final[Mapping[str, Mapping[str, str]]] = {
     "tug": {
@@ -30,13 +30,13 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "walk_10m": {
         "get_ready": "Stand still at the start, both feet side by side.",
-        "ready": "On “Go”: walk straight on at your usual pace to the far mark.",
-        "running": "Walk on to the far mark, then stand still.",
+        "ready": "On “Go”: walk straight ahead at your usual pace to the far mark.",
+        "running": "Walk to the far mark, then stand still.",
     },
     "walk_6min": {
         "get_ready": "Stand still at the start, both feet side by side.",
-        "ready": "On “Go”: walk to and fro for six minutes, as far as you can. You may rest.",
-        "running": "Walk on, as far as you can. You may slow down or rest.",
+        "ready": "On “Go”: walk back and forth for six minutes, as far as you can. You may rest.",
+        "running": "Keep walking as far as you can. You may slow down or rest.",
     },
     "standing_eyes_open": {
         "get_ready": "Stand still, arms at your sides, and look straight ahead.",
@@ -44,7 +44,7 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
         "running": f"{_UPRIGHT} Eyes open.",
     },
     "standing_eyes_closed": {
-        "get_ready": "Stand still, arms at your sides. Somebody stands beside you. Close your eyes.",
+        "get_ready": "Stand still, arms at your sides. Someone is next to you. Close your eyes.",
         "ready": "Stand still.",
         "running": f"{_UPRIGHT} Eyes closed.",
     },
@@ -56,8 +56,12 @@ HINTS: Final[Mapping[str, str]] = {
     "five_sit_to_stand": "The clock starts with the first lean and stops after the fifth sitting down.",
     "walk_10m": "Walk 14 m. The clock starts with the first step; two seconds of standing end the test.",
     "walk_6min": "The clock starts with the first step and stops after six minutes.",
-    "standing_eyes_open": "Press Go. The clock starts after two quiet seconds and stops after 30 s.",
-    "standing_eyes_closed": "Press Go. The clock starts after two quiet seconds and stops after 30 s.",
+    "standing_eyes_open": (
+        "Press Go. The clock starts after two seconds of quiet standing and stops after 30 s."
+    ),
+    "standing_eyes_closed": (
+        "Press Go. The clock starts after two seconds of quiet standing and stops after 30 s."
+    ),
 }
 """How a test begins and ends."""
 

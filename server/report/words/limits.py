@@ -10,18 +10,18 @@ from sagittal.core.flags import RULES, Flag
 from sagittal.server.report.words.wording import format_number, reason_words
 
 NAMES: Final[Mapping[str, str]] = {
-    "stiff_knee": "Swing peak of the knee below the other side's",
-    "low_knee_flexion_swing": "Swing peak of the knee",
-    "knee_hyperextension": "Least knee flexion in stance",
-    "low_dorsiflexion_swing": "Most dorsiflexion in swing",
+    "stiff_knee": "Peak knee flexion in swing vs other side",
+    "low_knee_flexion_swing": "Peak knee flexion in swing",
+    "knee_hyperextension": "Minimum knee flexion in stance",
+    "low_dorsiflexion_swing": "Peak dorsiflexion in swing",
     "flat_contact": "Foot pitch at contact",
-    "low_toe_clearance": "Least toe clearance",
-    "circumduction": "Swing path outward",
-    "hip_hiking": "Pelvis up in swing",
-    "low_hip_extension": "Least hip flexion",
-    "hip_range_asymmetry": "Hip range below the other side's",
-    "knee_range_asymmetry": "Knee range below the other side's",
-    "ankle_range_asymmetry": "Ankle range below the other side's",
+    "low_toe_clearance": "Minimum toe clearance",
+    "circumduction": "Circumduction",
+    "hip_hiking": "Pelvic elevation in swing",
+    "low_hip_extension": "Peak hip extension",
+    "hip_range_asymmetry": "Hip range vs other side",
+    "knee_range_asymmetry": "Knee range vs other side",
+    "ankle_range_asymmetry": "Ankle range vs other side",
     "step_length_asymmetry": "Longer step over shorter step",
     "stance_asymmetry": "Longer stance over shorter stance",
     "swing_asymmetry": "Longer swing over shorter swing",
@@ -33,18 +33,18 @@ if _unnamed := {rule.name for rule in RULES} - set(NAMES):
     raise ValueError(f"server.report.limits has no words for the rules {', '.join(sorted(_unnamed))}.")
 
 NOTES: Final[Mapping[str, str]] = {
-    "sides_stand_differently": "a difference in standing is part of it",
+    "sides_stand_differently": "includes a difference in standing posture",
 }
 
 REASONS: Final[Mapping[str, str]] = {
-    "angle_zero_standing": "needs goniometer angles of standing",
-    "no_controls": "needs this clinic's own controls",
+    "angle_zero_standing": "requires goniometer angles in standing",
+    "no_controls": "requires this clinic's own controls",
     "side_missing": "the other side is missing",
     "near_zero": "a side is near zero",
-    "no_norm_for_age": "the people of the limit are adults",
+    "no_norm_for_age": "the limit applies to adults",
     "no_speed_matched_norm": "no norm at this walking speed",
-    "too_few_strides": "too few strides to judge",
-    "sides_alike": "strides and measurement do not say that the sides differ",
+    "too_few_strides": "too few strides to assess",
+    "sides_alike": "strides and measurement error do not show a difference between sides",
 }
 """Why a value cannot be held against its limit; other codes as in the table."""
 

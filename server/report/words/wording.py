@@ -99,7 +99,7 @@ def parameter_term(name: str) -> Term:
 
 ZERO_WORDS: Final[Mapping[str, str]] = {
     "anatomical": "anatomical",
-    "standing": "from standing",
+    "standing": "relative to standing",
     "walking": "from the mean in walking",
     "stride_mean": "from its mean over the stride",
 }
@@ -112,55 +112,56 @@ def title_of(name: str, label: str, zero: str = "standing") -> str:
 
 
 REASONS: Final[Mapping[str, str]] = {
-    "no_strides": "not measured: no stride of this side counts",
-    "too_few_strides": "not measured: fewer than 4 strides of this side count",
+    "no_strides": "not measured: no included stride on this side",
+    "too_few_strides": "not measured: fewer than 4 included strides on this side",
     "no_angles": "not measured: the leg has no joint angles",
     "no_whole_day": "not measured: no day was worn for ten hours",
-    "no_repetitions": "not measured: nobody squatted",
-    "no_counted_repetitions": "not measured: no squat counts",
-    "no_rise": "not measured: nobody rises from a chair",
-    "no_sit_down": "not measured: nobody sits down after rising",
-    "turn_missing": "not measured: two half turns between rising and sitting down were not found",
-    "too_few_rises": "not measured: fewer than five rises in a row",
-    "standing_too_short": "not measured: nobody stands quietly for 20 s",
-    "noise_dominated": "withheld: the sensor's own noise makes too much of it",
+    "no_repetitions": "not measured: no squats detected",
+    "no_counted_repetitions": "not measured: no squat could be included",
+    "no_rise": "not measured: no rise from a chair detected",
+    "no_sit_down": "not measured: no sitting down after the rise detected",
+    "turn_missing": "not measured: two half turns between rising and sitting down not detected",
+    "too_few_rises": "not measured: fewer than five consecutive rises",
+    "standing_too_short": "not measured: no 20 s of quiet standing",
+    "noise_dominated": "not reported: dominated by sensor noise",
     "walk_too_short": "not measured: the walk is too short for this test",
-    "test_not_found": "not measured: the test was not found",
-    "in_place": "not measured: the foot came down where it was",
-    "no_terminal_contact": "not measured: no foot-off was found",
-    "no_turns": "not measured: no turn in this take",
-    "no_bouts": "not measured: nobody walked for long enough",
+    "test_not_found": "not measured: test not detected",
+    "in_place": "not measured: the foot landed where it started",
+    "no_terminal_contact": "not measured: no foot-off detected",
+    "no_turns": "not measured: no turn in this trial",
+    "no_bouts": "not measured: no sufficiently long walk",
     "no_walking": "not measured: the trunk hardly moved",
-    "non_periodic": "not measured: the trunk's movement has no rhythm of steps",
-    "few_steps": "not measured: too few steps in a row",
-    "opposite_foot_missing": "not measured: needs sensors on both feet",
+    "non_periodic": "not measured: trunk movement has no step rhythm",
+    "few_steps": "not measured: too few consecutive steps",
+    "opposite_foot_missing": "not measured: requires sensors on both feet",
     "no_double_support": "not measured: the feet were never on the floor together",
-    "joint_missing": "not measured: a segment of this joint carries no sensor",
-    "estimator_bad": "withheld: the sensors contradict each other here",
-    "feet_contradict": "withheld: the contacts of left and right contradict each other",
-    "path_bad": "withheld: the foot's path does not fit its rests on the floor",
-    "fixed_by_model": "not measured: the leg model holds it fixed",
-    "at_bound": "withheld: the leg model's knee rests on its limit",
-    "impossible": "withheld: nobody can walk like this",
+    "joint_missing": "not measured: a segment of this joint has no sensor",
+    "estimator_bad": "not reported: the sensors contradict each other here",
+    "feet_contradict": "not reported: left and right contacts contradict each other",
+    "path_bad": "not reported: the foot path does not match its foot-flat periods",
+    "fixed_by_model": "not measured: fixed in the leg model",
+    "at_bound": "not reported: the knee of the leg model is at its limit",
+    "impossible": "not reported: not physiologically plausible",
     "gap": "not measured: the sensor was lost in every stride",
     "packets_lost": "not measured: packets were lost in the swing of every stride",
-    "treadmill": "not measured: on a treadmill the belt's speed is needed, and gives speed and stride length",
+    "treadmill": "not measured: on a treadmill, speed and stride length require the belt speed",
     "no_foot_track": "not measured: no sensor on this foot",
-    "no_foot_flat": "not measured: the foot never rested on the floor",
-    "no_standing": "not measured: no usable standing in this take",
-    "angle_zero_standing": "not measured: angles start from standing; enter goniometer angles",
-    "no_level": "not measured: has a shape over the stride, no level against the walking direction",
+    "no_foot_flat": "not measured: the foot was never flat on the floor",
+    "no_standing": "not measured: no usable quiet standing in this trial",
+    "angle_zero_standing": "not measured: angles are relative to standing; enter goniometer angles",
+    "no_level": "not measured: only the shape over the stride is known, not its level relative to the "
+    "walking direction",
     "variables_missing": "not measured: some of its variables are missing",
     "estimated": "not measured by two sensors",
-    "standing_width_unknown": "not measured: enter how far apart the ankles are while standing",
-    "feet_not_linked": "not measured: needs sensors on both legs and the pelvis to place the feet",
-    "no_shoe_geometry": "not measured: needs the shape of the shoe",
+    "standing_width_unknown": "not measured: enter the distance between the ankles while standing",
+    "feet_not_linked": "not measured: requires sensors on both legs and the pelvis to locate the feet",
+    "no_shoe_geometry": "not measured: requires the shape of the shoe",
     "no_swing_minimum": "not measured: the toe's height has no dip in swing",
     "no_foot_sensor": "not measured: no sensor on this foot",
     "no_pelvis_sensor": "not measured: no sensor on the pelvis",
-    "no_forward": "not measured: a trunk sensor alone does not know which way is forward",
-    "no_run": "not measured: never three strides in a row that count",
-    "few_strides": "not measured: needs at least 10 strides that count",
+    "no_forward": "not measured: the forward direction is unknown with a trunk sensor alone",
+    "no_run": "not measured: never three consecutive included strides",
+    "few_strides": "not measured: requires at least 10 included strides",
     "no_mid_stance": "not measured: the heel rises before the other foot leaves the floor",
     "no_terminal_stance": "not measured: the heel stays down until the other foot lands",
     "feet_not_adjacent": "not measured: the swinging foot does not pass the other",
@@ -178,7 +179,7 @@ EXCLUDED: Final[Mapping[str, str]] = {
     "last": "last of a walk",
     "gap": "sensor lost",
     "implausible_time": "implausible duration",
-    "outlier": "unlike the others",
+    "outlier": "atypical",
     "non_periodic": "not periodic",
 }
 """Code of a stride left out → words."""
@@ -225,7 +226,7 @@ def speak_places(text: str) -> str:
 _SIDED: Final = re.compile(r"\b(?:thigh|shank|foot)_[lr]\b")
 
 NOT_COUNTED: Final[Mapping[str, str]] = {
-    "incomplete": "cut by the start or end of the take",
+    "incomplete": "cut by the start or end of the trial",
     "signal_lost": "a sensor was silent",
     "foot_moved": "the foot moved",
     "foot_lifted": "the foot was off the floor",
@@ -310,12 +311,12 @@ def difference_words(left: float, right: float, term: Term) -> str:
 
 
 JUDGED: Final[Mapping[str | None, str]] = {
-    "warn": "The pose estimator doubts part of its result.",
-    "bad": "The sensors contradict each other: the pose estimator cannot stand behind its result.",
+    "warn": "The pose estimator considers part of its result unreliable.",
+    "bad": "The sensors contradict each other, so the estimated poses are unreliable.",
 }
 """Verdict of the estimator → reason of the level."""
 
 PATH_JUDGED: Final = (
-    "The path of a foot does not fit its rests on the floor: the estimator cannot stand behind its distances."
+    "The path of a foot does not match its foot-flat periods, so its distances are unreliable."
 )
 """The same where nothing but the path of a foot is bad."""

@@ -62,7 +62,7 @@ def test_a_drift_has_a_direction(change_s: float, which: str) -> None:
 def test_an_exchange_names_its_pairs() -> None:
     found = SensorExchange((("thigh_l", "thigh_r"), ("foot_l", "foot_r")), 1.5, None)
     assert say_exchange(found) == (
-        "The joints show that sensors are exchanged: thigh_l with thigh_r and foot_l with foot_r."
+        "Joint motion shows that sensors are swapped: thigh_l with thigh_r and foot_l with foot_r."
     )
     told = tell_exchange(found, ExchangeParams())
     assert (told.code, told.sensor) == ("sensors_exchanged", "thigh_l")

@@ -115,7 +115,7 @@ def test_few_wild_strides_widen_the_limit() -> None:
     (found,) = parameter_changes([before], [after])
     assert found.limit is not None
     assert found.limit > 0.067
-    assert found.limit_source == "strides and measurement of the two sessions, 95 %"
+    assert found.limit_source == "strides and measurement of the two visits, 95 %"
     many = [summarise_values("step_length_m", "left", [m - 0.01, m + 0.01] * 30, "m") for m in (0.40, 0.50)]
     (steady,) = parameter_changes([many[0]], [many[1]])
     assert (steady.limit, steady.verdict) == (0.067, "real_change")

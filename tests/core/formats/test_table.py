@@ -54,9 +54,9 @@ def test_columns_lined_up_with_several_spaces_are_read() -> None:
 def test_times_that_hardly_differ_give_no_endless_rate() -> None:
     rows = [f"{i * 5e-324},{row}" for i, row in enumerate(table().split("\n")[1:-1])]
     text = "\n".join(["t,ax,ay,az,gx,gy,gz", *rows])
-    stream = read(text, rate_hz=None, time_column="t").streams["shank_l"]
-    assert stream.rate_hz == 100.0
-    assert [n.code for n in stream.notices] == ["rate_unknown"]
+    with pytest.raises(FormatError) as e:
+        read(text, rate_hz=None, time_column="t")
+    assert e.value.code == "time_constant"
 
 
 COUNTER = {"rate_hz": None, "counter": {"column": "n", "rate_hz": 100}}
@@ -98,7 +98,7 @@ def test_tables_that_share_a_counter_share_the_time() -> None:
 
 
 @pytest.mark.parametrize(
-    ("counts", "counter", "code", "words"),
+    ("included", "counter", "code", "words"),
     [
         (np.arange(300) * 2, {}, "bad_counter", "'n' goes up by 2 from row to row, expected 1"),
         (np.arange(300), {"wrap": 256}, "bad_counter", "counts to 299, but counter.wrap is 256"),
@@ -281,7 +281,8 @@ def test_a_row_without_time_leaves_the_rate_known() -> None:
     lines[50] = ",".join("" if i == 2 else cell for i, cell in enumerate(lines[50].split(",")))
     stream = read("\n".join(lines), rate_hz=None, time_column="X [s]#2").streams["shank_l"]
     assert stream.rate_hz == pytest.approx(100.0)
-    assert [n.code for n in stream.notices] == ["out_of_order"]
+    assert [n.code for n in stream.notices] == ["stamps_missing"]
+    assert len(stream.t_s) == 300
 
 
 def test_titles_that_nobody_asks_for_may_repeat() -> None:

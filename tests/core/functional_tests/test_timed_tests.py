@@ -162,7 +162,7 @@ def test_three_rises_are_too_few_and_six_are_told() -> None:
 
 def test_the_trunk_needs_a_sensor_and_a_rest() -> None:
     take = tug()[0]
-    with pytest.raises(EstimationError, match="pelvis or the chest"):
+    with pytest.raises(EstimationError, match="pelvis or chest"):
         follow_trunk(replace(take, sensors={}))
     start = 700
     cut = take.sensors["pelvis"]

@@ -86,11 +86,11 @@ def test_the_share_is_of_the_time_worn() -> None:
     ("spans", "notices", "doubts"),
     [
         ([("sitting", 91), ("unknown", 9)], (), []),
-        ([("sitting", 89), ("unknown", 11)], (), ["The posture is not known in 11 % of the time worn."]),
+        ([("sitting", 89), ("unknown", 11)], (), ["Posture is unknown for 11 % of the wear time."]),
         ([("sitting", 91), ("gap", 9)], (), []),
-        ([("sitting", 89), ("gap", 11)], (), ["11 % of the time nothing was recorded."]),
-        ([("sitting", 9)], ("no_baseline",), ["Without walking it is not certain which way is up."]),
-        ([("sitting", 9)], ("baseline_assumed",), ["Without walking it is not certain which way is up."]),
+        ([("sitting", 89), ("gap", 11)], (), ["No data for 11 % of the time."]),
+        ([("sitting", 9)], ("no_baseline",), ["Without walking, the vertical is uncertain."]),
+        ([("sitting", 9)], ("baseline_assumed",), ["Without walking, the vertical is uncertain."]),
         ([("sitting", 9)], ("read_in_blocks",), []),
     ],
 )
@@ -114,4 +114,4 @@ def test_half_of_the_time_must_be_known_to_be_of_use(unknown: float, level: str)
 
 def test_without_anything_read_it_is_poor() -> None:
     report = judge_activity(TakeAnalysis(Recording({}, {})), PipelineConfig()).quality
-    assert (report.level, report.reasons) == ("poor", ("Nothing could be read from the sensor.",))
+    assert (report.level, report.reasons) == ("poor", ("The sensor provided no usable data.",))

@@ -70,7 +70,9 @@ def test_the_files_give_the_report_back() -> None:
     report = report_model(load_bundle(files))
     assert [name for name, _ in report.groups] == ["Squats"]
     assert report.quality.word == "Good data"
-    assert ("Squats used", "6", "right leg") in [(i.label, i.value, i.extra) for i in report.quality.items]
+    assert ("Squats included", "6", "right leg") in [
+        (i.label, i.value, i.extra) for i in report.quality.items
+    ]
     assert report.problem is None
 
 

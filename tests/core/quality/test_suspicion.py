@@ -60,7 +60,7 @@ def test_the_force_at_rest_is_gravity(norm: float, expected: list[tuple[str, str
         (0.501 * GRAVITY, 2.0, 2.0, [], ""),
         (1.999 * GRAVITY, 2.0, 2.0, [], ""),
         (2.001 * GRAVITY, 2.0, 2.0, [UNIT], "is around 19.6 m/s²"),
-        (0.499 * GRAVITY, 2.0, 2.0, [REMOVED], "in the middle of the take"),
+        (0.499 * GRAVITY, 2.0, 2.0, [REMOVED], "mid-trial"),
         (1.0, 0.9, 0.3, [UNIT], "looks like g"),
         (0.71, 0.9, 0.3, [UNIT], "looks like g"),
         (1.49, 0.9, 0.3, [UNIT], "looks like g"),

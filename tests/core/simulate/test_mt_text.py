@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sagittal.core.formats.draft import finish
+from sagittal.core.formats.common_time import finish
 from sagittal.core.formats.vendors import xsens
 from sagittal.core.simulate import RecordingSetup, Simulation, Stand, Straight, mt_files, mt_text, simulate
 

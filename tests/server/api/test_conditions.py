@@ -125,9 +125,9 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     there = [c for c in found["changes"] if c["difference"] is not None]
     assert there
     assert {(c["verdict"], c["towards_norm"]) for c in there} == {(None, None)}
-    assert {c["words"] for c in there} == {"not judged, the conditions differ"}
+    assert {c["words"] for c in there} == {"not assessed: the conditions differ"}
     page = await _get(clinic, f"/sessions/{fast}/compare/{own}")
-    assert "No change is judged" in page
+    assert "Changes not assessed" in page
     assert "real change" not in page.lower()
     rows = csv.DictReader(io.StringIO(await _get(clinic, f"{API}/sessions/{fast}/compare/{own}/changes.csv")))
     assert {(r["verdict"], r["reason"]) for r in rows if r["change"]} == {("", "conditions_differ")}
@@ -142,7 +142,7 @@ async def test_walks_of_unstated_condition_are_compared_with_a_caution(clinic: C
     found = await _get(clinic, f"{API}/sessions/{two}/compare/{one}")
     assert found["comparable"] is True
     assert found["cautions"] == [
-        "Not stated in either session: pace, aid, orthosis, shoes. They are taken to be alike."
+        "Not stated for either visit: pace, aid, orthosis, shoes. Assumed to be the same."
     ]
     assert await _since(clinic, two) == one
     assert "condition not stated" in await _get(clinic, f"/patients/{patient}")
@@ -283,7 +283,7 @@ async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and
     patient = feedback.person(clinic)
     first, later = feedback.walked(clinic, patient, 0, **OWN), feedback.walked(clinic, patient, 7, **OWN)
     screen, paper = [await _get(clinic, f"/sessions/{later}{page}") for page in ("", "/print")]
-    for words in ("What stands out", "Changed since 2 Mar 2026", "Sagittal profile score"):
+    for words in ("Findings", "Changed since 2 Mar 2026", "Sagittal profile score"):
         assert words in paper
         assert words in screen
     begins = paper.index("r-tbl params")

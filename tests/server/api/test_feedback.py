@@ -97,7 +97,7 @@ async def test_strides_with_and_without_feedback_are_told_apart(clinic: Clinic) 
     assert float(lines[-1]["live_value"]) - float(lines[-1]["value"]) == pytest.approx(TOLD, abs=1e-5)
     for text in (page, paper):
         assert "With feedback" in text
-        assert "of these in probe blocks" in text
+        assert "of these, in probe blocks" in text
         assert "fb-plot" in text
 
 
@@ -117,7 +117,7 @@ async def test_an_edited_stride_leaves_the_sums_and_is_said(clinic: Clinic) -> N
         return next(int(r["n"]) for r in answer["rows"] if r["kind"] == "with")
 
     assert n(after) == n(before) - 1
-    assert "1 cue, left out, has a stride that does not count in the analysis." in after["notes"]
+    assert "1 cue was excluded because its stride is excluded from the analysis." in after["notes"]
 
 
 @pytest.mark.slow

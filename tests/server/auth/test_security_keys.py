@@ -93,7 +93,7 @@ async def test_a_key_takes_the_place_of_the_code(
     assert (await challenge(clinic)).status_code == 404
     async with clinic.client("admin") as admin:
         rows = (await admin.get(f"{API}/audit")).json()
-        assert "signed in by the password and a security key" in (await admin.get("/audit")).text
+        assert "signed in with password and security key" in (await admin.get("/audit")).text
     assert next(row["detail"] for row in rows if row["action"] == "sign_in") == {"factor": "security_key"}
     actions = [row["action"] for row in rows]
     assert {"user.security_key_added", "user.security_key_removed", "sign_in.failed"} <= set(actions)

@@ -117,7 +117,7 @@ def test_events_say_which_strides_were_left_out_and_by_whom() -> None:
 
 def test_nobody_is_named_and_great_age_is_not_told() -> None:
     told = VisitFacts(
-        "a b-7", "Mueller 1931", "v/1", "2026-03-02", age_years=94, sex="male", condition="own pace"
+        "a b-7", "Mueller 1931", "v/1", "2026-03-02", age_years=94, sex="male", condition="comfortable pace"
     )
     files = written(replace(open_walk(), visit=told))
     (person,) = rows(files["participants.tsv"])

@@ -103,7 +103,7 @@ def test_levels_from_the_anatomical_zero_are_those_from_standing_plus_what_was_r
     words = {r["name"]: r for r in found["data_dictionary.csv"]}[level]
     assert words["unit"] == "deg"
     assert words["label"].endswith(", anatomical")
-    assert "from the anatomical zero" in words["definition"]
+    assert "from neutral (0°)" in words["definition"]
     fhir = json.loads(write_export("fhir", content))
     codes = [e["resource"].get("code", {}).get("coding", [{}])[0].get("code") for e in fhir["entry"]]
     assert codes.count(level) == 2

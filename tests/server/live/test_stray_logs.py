@@ -184,7 +184,7 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
         assert "damaged on the server's disk" in caplog.text
         async with clinic.client("clinician") as http:
             async with asyncio.timeout(PATIENCE_S):
-                while "A part of the live recording is lost" not in (
+                while "Part of the live recording was lost" not in (
                     page := (await http.get(f"/sessions/{session}")).text
                 ):
                     await asyncio.sleep(0.05)

@@ -66,7 +66,7 @@ def test_trails_that_were_not_sent_are_joined_and_other_names_are_another_curve(
         ({"silent_s": 12.4, "lost_share": 0.5}, "bad", "silent for 12 s"),
         ({"lost_share": 0.25}, "bad", "25 % lost"),
         ({"lost_share": 0.02, "saturated_share": 0.1}, "warn", "2 % lost"),
-        ({"saturated_share": 0.01}, "warn", "at its range"),
+        ({"saturated_share": 0.01}, "warn", "saturated"),
         ({"doubt": "sensors_exchanged", "lost_share": 0.02}, "bad", "exchanged"),
         ({"doubt": "sensor_slipped"}, "bad", "slipped"),
         ({"doubt": "sensor_late"}, "warn", "late"),

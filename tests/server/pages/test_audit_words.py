@@ -48,5 +48,5 @@ async def test_rows_name_the_patient_and_the_visit_while_they_exist(clinic: Clin
 
 def test_a_sign_in_says_by_which_factor() -> None:
     assert set(SIGNED_IN_BY) == set(Factor)
-    assert describe_deed("sign_in", {"factor": "code"}) == "signed in by the password and a code"
+    assert describe_deed("sign_in", {"factor": "code"}) == "signed in with password and code"
     assert describe_deed("sign_in", {}) == "signed in"  # a row from before

@@ -65,12 +65,12 @@ async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
     assert total is not None
     assert float(total.group(1)) == pytest.approx(20.9, abs=0.3)
     labels = re.findall(r"<td>(.*?)</td>", card)
-    assert labels == ["Rising", "Way out", "Turn", "Way back", "Turn and sitting down"]
+    assert labels == ["Rising", "Walk out", "Turn", "Walk back", "Turn and sitting down"]
     assert card.count("<rect") == 5
     assert "slower than average above 10.2 s" in card
     assert "Bohannon 2006" in card
     assert "Visit before" not in card
-    assert "by the sensor: pelvis" in card
+    assert "measured by the sensor: pelvis" in card
 
 
 @pytest.mark.slow
@@ -90,7 +90,7 @@ async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
     card = card_of(html)
     before = card[card.index("Visit before") :]
     assert re.search(r'class="v">2[01]\.\d<', before)
-    assert "start and end confirmed or set by hand" in card
+    assert "start and end confirmed or set manually" in card
     assert "No strides" not in html
     said = re.search(r'name="manifest" data-type="json" value="(.*?)"', card)
     assert said is not None
@@ -108,7 +108,7 @@ async def test_the_api_tells_the_test(clinic: Clinic, visits: list[str]) -> None
     async with clinic.client("admin") as client:
         found = (await client.get(f"/api/v1/sessions/{visits[1]}/report")).json()
     test = found["functional"]
-    assert [s["label"] for s in test["segments"]][:2] == ["Rising", "Way out"]
+    assert [s["label"] for s in test["segments"]][:2] == ["Rising", "Walk out"]
     assert test["corrected"]
     assert found["quality"]["kind"] == "ok"
     rows = {p["name"]: p for p in found["parameters"]}
@@ -134,7 +134,7 @@ async def test_a_test_without_curves_has_no_tab_and_no_sheet_of_them(
     assert "Timeline" in tabs
     assert "<gait-view" not in overview
     assert "This test has no curves" in await page(clinic, f"/sessions/{visits[0]}/kinematics")
-    assert "Filters are compared on walks" in await page(clinic, f"/sessions/{visits[0]}/algorithms")
+    assert "Filters can be compared on walks only" in await page(clinic, f"/sessions/{visits[0]}/algorithms")
     paper = await page(clinic, f"/sessions/{visits[0]}/print")
     assert paper.count('class="sheet paper"') == 1
     assert "<h1>Timed up and go</h1>" in paper

@@ -52,7 +52,7 @@ def row_of(html: str, code: str) -> str:
     ("code", "changed", "kind", "word"),
     [
         ("Q-GOOD", {"warnings": []}, "ok", "Good data"),
-        ("Q-USABLE", {"quality": {"level": "usable"}, "warnings": []}, "warn", "Usable, see notices"),
+        ("Q-USABLE", {"quality": {"level": "usable"}, "warnings": []}, "warn", "Usable with caution"),
         ("Q-POOR", {"quality": {"level": "poor"}, "warnings": []}, "bad", "Poor data"),
         ("Q-APART", {"estimator": {"verdict": "bad"}, "warnings": []}, "bad", "Sensors disagree"),
         (
@@ -74,7 +74,7 @@ def row_of(html: str, code: str) -> str:
                 "warnings": [],
             },
             "bad",
-            "Foot path in doubt",
+            "Foot path unreliable",
         ),
         ("Q-NONE", {"parameters": [], "warnings": []}, "bad", "No strides"),
     ],
@@ -153,7 +153,7 @@ async def test_files_that_were_changed_after_the_analysis_are_not_taken_for_its_
     assert queue.finish(claim, lambda c: None)
     assert note in await page(clinic, path)
     told = await page(clinic, f"{path}/data")
-    assert "changed after this analysis; what it was made from is in the archive" in told
+    assert "changed after this analysis; the files it used are in the archive" in told
     assert "exactly as uploaded" not in told
 
 
@@ -202,7 +202,7 @@ async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic
     _, session = await visit(clinic, "LIGHT")
     overview = await page(clinic, f"/sessions/{session}")
     assert len(overview.encode()) < 80_000
-    assert "On the norm" in overview
+    assert "Compared with norm" in overview
     names = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', overview))
     values = await page(clinic, f"/sessions/{session}/values")
     others = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))

@@ -56,10 +56,10 @@ async def test_the_page_lists_every_squat_and_draws_those_that_count(clinic: Cli
     assert "% of squat" in card
     assert "gait cycle" not in card
     assert "left mean of 2 squats" in card
-    assert "mean of the squats used" in html
-    assert "Depth: knee flexion at the deepest point" in html
+    assert "mean of the included squats" in html
+    assert "Depth: knee flexion at the lowest point" in html
     assert "No strides" not in html
-    assert "Squats have no norm." in html
+    assert "There is no norm for squats." in html
 
 
 @pytest.mark.parametrize("part", ["kinematics", "data", "print", "parameters/squat_depth_deg", "timeline"])
@@ -77,11 +77,11 @@ async def test_what_is_said_of_strides_is_not_said_of_squats(clinic: Clinic, ses
     assert "Run again" not in timeline
     kinematics = await page(clinic, f"/sessions/{session}/kinematics")
     assert "Curves of squats are on the overview" in kinematics
-    assert "no stride of this side counts" not in kinematics
+    assert "no included stride on this side" not in kinematics
     algorithms = await page(clinic, f"/sessions/{session}/algorithms")
-    assert "Filters are compared on walks" in algorithms
-    assert "Run on this take" not in algorithms
-    assert "Walks:" not in await page(clinic, f"/sessions/{session}")
+    assert "Filters can be compared on walks only" in algorithms
+    assert "Run on this trial" not in algorithms
+    assert "Condition:" not in await page(clinic, f"/sessions/{session}")
 
 
 async def test_paper_has_every_squat_and_their_curves(clinic: Clinic, session: str) -> None:
@@ -149,8 +149,8 @@ async def test_the_sensitivity_is_a_tab_of_squats(clinic: Clinic, both: str) -> 
     assert f'href="/sessions/{both}/sensitivity"' in html
     assert "/algorithms" not in html
     form = await page(clinic, f"/sessions/{both}/sensitivity")
-    assert "How sure are these angles?" in form
-    assert "Run on this take" in form
+    assert "How sensitive are these angles?" in form
+    assert "Run on this trial" in form
 
 
 async def test_squats_have_no_norm_columns_and_a_low_confidence_names_no_larger_side(
@@ -158,7 +158,7 @@ async def test_squats_have_no_norm_columns_and_a_low_confidence_names_no_larger_
 ) -> None:
     html = await page(clinic, f"/sessions/{both}")
     values = html[html.index('id="rows"') : html.index('id="h-squats"')]
-    assert "On the norm" not in values
+    assert "Compared with norm" not in values
     assert "grey box" not in values
     async with clinic.client("admin") as client:
         found = (await client.get(f"/api/v1/sessions/{both}/report")).json()

@@ -70,7 +70,7 @@ async def test_every_answer_has_an_id_and_a_secure_one_forbids_plain_http(tmp_pa
 
 async def test_who_has_not_come_for_years_is_listed(tmp_path: Path) -> None:
     async with open_clinic(tmp_path, retention_years=10) as clinic, clinic.client("admin") as admin:
-        assert "Nobody." in (await admin.get("/system")).text
+        assert "None." in (await admin.get("/system")).text
         today = now().date()
         for code, visit in (("OLD", move_years(today, -11)), ("NEW", move_years(today, -9)), ("NONE", None)):
             made = (await admin.post("/api/v1/patients", json={"code": code})).json()["id"]

@@ -32,13 +32,13 @@ class FilterChoice extends HTMLElement {
       engine.indeterminate = on > 0 && on < boxes.length;
     }
     const n = this.chosen().length;
-    this.querySelector("[data-count]").textContent = speak`${n} of ${this.filters.length} chosen`;
+    this.querySelector("[data-count]").textContent = speak`${n} of ${this.filters.length} selected`;
   }
 
   async run() {
     const button = this.querySelector("[type=submit]");
     if (!this.chosen().length) {
-      showProblem(this.querySelector(".form-error"), new Problem(422, { title: speak`No filter chosen`, detail: speak`Choose one or more, two to see how far they are apart.` }));
+      showProblem(this.querySelector(".form-error"), new Problem(422, { title: speak`No filter chosen`, detail: speak`Choose one or more; two show how far they differ.` }));
       return;
     }
     button.disabled = true;

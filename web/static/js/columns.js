@@ -17,7 +17,7 @@ const SHOWN_KEYS = ["rate_hz", "time_column", "time_unit", "counter", "acc_unit"
 const DEG = 180 / Math.PI;
 
 const roles = () => [
-  ["", speak`Not used`], ["time", speak`Time`], ["counter", speak`Counter of samples`],
+  ["", speak`Not used`], ["time", speak`Time`], ["counter", speak`Sample counter`],
   ...Object.entries(AXES).flatMap(([kind, axes]) => [...axes].map((axis) => [`${kind} ${axis}`, NAMES[kind](axis)])),
 ];
 
@@ -52,8 +52,8 @@ class Shape {
 
   row(name, i, [role, sensor]) {
     const values = this.found.rows.slice(0, SHOWN).map((cells) => cells[i] ?? "").join(" · ");
-    const what = select(roles(), role, { "aria-label": speak`What column ${name} is` });
-    const whose = /** @type {HTMLInputElement} */ (h("input", { class: "input sm", value: sensor === THE_FILE ? "" : sensor, placeholder: speak`as the file`, "aria-label": speak`Sensor of column ${name}`, maxlength: 64 }));
+    const what = select(roles(), role, { "aria-label": speak`Meaning of column ${name}` });
+    const whose = /** @type {HTMLInputElement} */ (h("input", { class: "input sm", value: sensor === THE_FILE ? "" : sensor, placeholder: speak`as in the file`, "aria-label": speak`Sensor of column ${name}`, maxlength: 64 }));
     const row = { name, what, whose, element: null };
     const show = () => { whose.hidden = !what.value.includes(" "); };
     what.addEventListener("input", show);
@@ -65,18 +65,18 @@ class Shape {
   draw() {
     const { files, basis } = this.found;
     const field = (label, input, help) => h("label", { class: "field" }, h("span", { class: "label" }, label), input, help ? h("span", { class: "help" }, help) : null);
-    const why = { known: speak`As such a table was described before. Change what is not right.`, said: speak`As set before. Change what is not right.` };
+    const why = { known: speak`Taken from a previous table of this layout. Correct if necessary.`, said: speak`As set before. Correct if necessary.` };
     const title = files.length === 1 ? files[0] : speak`${files[0]} and ${files.length - 1} more`;
     return h("div", { class: "stack g3", "data-shape": true },
       h("h3", { class: "wrapany" }, title),
-      h("p", { class: "small mut" }, why[basis] ?? speak`Guessed from names and numbers. Change what is not right.`),
+      h("p", { class: "small mut" }, why[basis] ?? speak`Suggested from names and values. Correct if necessary.`),
       h("div", { class: "scroll" }, h("table", { class: "tbl tight" },
-        h("thead", {}, h("tr", {}, h("th", {}, speak`Column`), h("th", { class: "hide-sm" }, speak`First values`), h("th", {}, speak`What it is`), h("th", {}, speak`Sensor`))),
+        h("thead", {}, h("tr", {}, h("th", {}, speak`Column`), h("th", { class: "hide-sm" }, speak`First values`), h("th", {}, speak`Meaning`), h("th", {}, speak`Sensor`))),
         h("tbody", {}, ...this.rows.map((r) => r.element)))),
       h("div", { class: "grid cols2 measures" },
-        field(speak`Samples per second`, this.rate, speak`Needed where no column is the time.`),
-        field(speak`Unit of time`, this.time, ""),
-        field(speak`Unit of acceleration`, this.acc, ""), field(speak`Unit of angular rate`, this.gyr, "")),
+        field(speak`Samples per second`, this.rate, speak`Required if there is no time column.`),
+        field(speak`Time unit`, this.time, ""),
+        field(speak`Acceleration unit`, this.acc, ""), field(speak`Angular rate unit`, this.gyr, "")),
       h("div", { role: "status" }, this.checks));
   }
 
@@ -86,7 +86,7 @@ class Shape {
     for (const { name, what, whose } of this.rows) {
       if (!what.value) continue;
       const role = what.value.includes(" ") ? JSON.stringify([what.value, whose.value.trim()]) : what.value;
-      if (taken.has(role)) return speak`${what.selectedOptions[0].text}: chosen for the columns ${taken.get(role)} and ${name}. Choose one of them.`;
+      if (taken.has(role)) return speak`${what.selectedOptions[0].text} is assigned to columns ${taken.get(role)} and ${name}. Choose one of them.`;
       taken.set(role, name);
     }
     return "";
@@ -116,7 +116,7 @@ class Shape {
     const said = (c) => [
       `${c.sensor}: ${localise(String(c.rate_hz))} Hz`,
       c.at_rest_mps2 === null ? speak`never at rest` : speak`at rest ${fixed(c.at_rest_mps2, 2)} m/s²`,
-      c.fastest_radps === null ? "" : speak`turns up to ${Math.round(c.fastest_radps * DEG)} °/s`,
+      c.fastest_radps === null ? "" : speak`up to ${Math.round(c.fastest_radps * DEG)} °/s`,
     ].filter(Boolean).join(" · ");
     this.checks.replaceChildren(...checks.map((c) => h("li", { "data-check": c.problems.length ? "warn" : "ok" },
       icon(c.problems.length ? "warn" : "check"), " ", said(c), ...c.problems.map((p) => h("p", { class: "small" }, translate(p))))));
@@ -124,7 +124,7 @@ class Shape {
 
   refuse(problem) {
     // the server speaks of the manifest, whose words nobody sees here
-    const said = problem.code === "rate_missing" ? speak`Enter the samples per second, or say which column is the time.` : translate(problem.detail || problem.title);
+    const said = problem.code === "rate_missing" ? speak`Enter the sampling rate or select the time column.` : translate(problem.detail || problem.title);
     this.checks.replaceChildren(h("li", { "data-check": "bad" }, icon("bad"), " ", said));
   }
 }

@@ -41,7 +41,7 @@ export async function savePicture(canvas, redraw, name, frame = null) {
   try {
     const picture = document.createElement("canvas");
     const taken = new Promise((done, fail) => {
-      setTimeout(() => fail(new Error(speak`No picture came from the 3D view.`)), PATIENCE_MS);
+      setTimeout(() => fail(new Error(speak`The 3D view returned no picture.`)), PATIENCE_MS);
       const take = () => {
         [picture.width, picture.height] = [video.videoWidth, video.videoHeight];
         const context = picture.getContext("2d", { willReadFrequently: true });

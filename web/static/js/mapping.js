@@ -142,9 +142,9 @@ class SensorMap extends HTMLElement {
   lacks(worn) {
     if (this.done() === "squat") {
       const leg = ["l", "r"].some((side) => worn.has(`thigh_${side}`) && worn.has(`shank_${side}`));
-      return leg && worn.has("pelvis") ? "" : speak`; a squat needs shank, thigh and pelvis`;
+      return leg && worn.has("pelvis") ? "" : speak`; a squat requires shank, thigh and pelvis sensors`;
     }
-    return worn.has("foot_l") && worn.has("foot_r") ? "" : speak`; without both feet there are no strides`;
+    return worn.has("foot_l") && worn.has("foot_r") ? "" : speak`; strides require sensors on both feet`;
   }
 
   report(worn, clashes) {
@@ -152,7 +152,7 @@ class SensorMap extends HTMLElement {
     clash.hidden = clashes.size === 0;
     if (clashes.size) {
       clash.querySelector("[data-title]").textContent = speak`Two sensors on one segment: ${[...clashes].map((segment) => this.name(segment)).join(", ")}`;
-      clash.querySelector("[data-detail]").textContent = speak`A segment carries one sensor. Set the other one to Not used.`;
+      clash.querySelector("[data-detail]").textContent = speak`Each segment can have only one sensor. Set the other one to Not used.`;
     }
     if (this.ask) {
       const row = worn.get("foot_l");
@@ -165,7 +165,7 @@ class SensorMap extends HTMLElement {
     const lacks = worn.size ? this.lacks(worn) : "";
     const sum = this.querySelector("[data-sum]");
     const asked = this.ask && !this.ask.hidden;
-    sum.textContent = asked ? speak`First say which foot is the left one` : plural(this.rows.length, speak`${worn.size} of ${this.rows.length} sensor placed${lacks}`, speak`${worn.size} of ${this.rows.length} sensors placed${lacks}`);
+    sum.textContent = asked ? speak`First indicate which foot is the left one` : plural(this.rows.length, speak`${worn.size} of ${this.rows.length} sensor assigned${lacks}`, speak`${worn.size} of ${this.rows.length} sensors assigned${lacks}`);
     const button = this.querySelector("[data-analyse]");
     if (button) button.disabled = worn.size === 0 || clashes.size > 0 || Boolean(asked);
   }

@@ -60,7 +60,7 @@ function summarise() {
   const told = [...form.querySelectorAll('input[name="modes"]:checked')].map((m) => lowered(m.parentElement.querySelector("b").textContent));
   const what = option().textContent.trim().split(",")[0];
   const wanted = (value || speak`not known yet`) + (source && value && target?.value !== "manual" ? ` (${lowered(source)})` : "");
-  form.querySelector("[data-summary]").textContent = speak`${what}, ${translate(side) || speak`both sides`}; target ${wanted}; told by ${told.join(speak` and `) || speak`nothing yet`}.`;
+  form.querySelector("[data-summary]").textContent = speak`${what}, ${translate(side) || speak`both sides`}; target ${wanted}; shown as ${told.join(speak` and `) || speak`nothing selected`}.`;
 }
 
 // A preset fills what decides; the target is the first of its sources that gives numbers for this person.

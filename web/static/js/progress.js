@@ -66,7 +66,7 @@ class JobProgress extends HTMLElement {
   // A server that has just started still loads, at its first start compiles, the filters.
   waiting() {
     const long = this.querySelector("[data-clock]") && Date.now() - this.started > PREPARED_MS;
-    return long ? speak`Waiting for the worker. After a start of the server that takes up to a minute.` : speak`Waiting for the worker`;
+    return long ? speak`Waiting for the worker. This takes up to a minute after a server start.` : speak`Waiting for the worker`;
   }
 
   // Stages before the current one are done, it runs, the rest wait; returns its name.

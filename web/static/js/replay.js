@@ -38,7 +38,7 @@ class GaitView extends HTMLElement {
     addEventListener("message", (e) => {
       if (e.source !== this.frame.contentWindow || e.origin !== location.origin) return;
       if (e.data === "drawn") this.uncover();
-      if (e.data === "no-3d") this.say(this.lacking = speak`This browser shows no 3D. The charts and the table have all values.`);
+      if (e.data === "no-3d") this.say(this.lacking = speak`This browser does not support 3D. All values are in the charts and the table.`);
     });
     this.onTick = () => this.request();
     clock.addEventListener("tick", this.onTick);
@@ -87,7 +87,7 @@ class GaitView extends HTMLElement {
     this.socket.onclose = (e) => {
       this.dataset.state = "lost";
       this.waiting = false;
-      if (e.code === 1008 && e.reason === "not_found") this.say(speak`You may no longer open this patient.`);
+      if (e.code === 1008 && e.reason === "not_found") this.say(speak`You no longer have access to this patient.`);
       if (e.code === 1008 || this.refused) return; // signed out or nothing to show: trying again would not help
       this.say(speak`Connection lost, trying again…`);
       this.timer = setTimeout(() => this.connect(), RETRY_MS[Math.min(this.tries++, RETRY_MS.length - 1)]);
@@ -116,7 +116,7 @@ class GaitView extends HTMLElement {
       this.options.querySelector("[data-estimated]").hidden = message.measured;
       const unseen = this.options.querySelector("[data-unseen]");
       unseen.hidden = !message.hidden.length;
-      unseen.textContent = speak`Not shown, no sensors there: ${message.hidden.map((segment) => SEGMENTS[segment]).join(", ")}.`;
+      unseen.textContent = speak`Not shown because there are no sensors: ${message.hidden.map((segment) => SEGMENTS[segment]).join(", ")}.`;
       for (const b of this.switches) this.tell(setting(b));
       if (this.look.value !== "near") this.tell({ look: this.look.value });
       if (this.ghosts) this.tell({ ghost: this.ghosts.value || null });
@@ -124,7 +124,7 @@ class GaitView extends HTMLElement {
     } else if (message.ghost !== undefined) {
       this.dataset.ghostShown = message.ghost ?? "";
       const wanted = this.ghosts?.value && this.ghosts.selectedOptions[0].text.trim();
-      this.lacking = wanted && !message.ghost ? (translate(message.why) ?? speak`This walk has no such ghost: ${wanted}`) : "";
+      this.lacking = wanted && !message.ghost ? (translate(message.why) ?? speak`This overlay is not available: ${wanted}`) : "";
       this.say(this.lacking);
     } else if (message.t !== undefined) {
       this.waiting = false;

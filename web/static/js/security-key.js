@@ -11,7 +11,7 @@ const said = (form, name) => /** @type {HTMLInputElement} */ (form.elements.name
 // What the browser refuses in words, in the form of a problem of the server.
 const TOLD = {
   NotAllowedError: () => speak`The key was not touched in time, or you cancelled. Try again.`,
-  InvalidStateError: () => speak`This key is set up already. Take another one.`,
+  InvalidStateError: () => speak`This key is already registered. Use another one.`,
 };
 
 /**
@@ -27,8 +27,8 @@ async function run(form, work) {
   } catch (error) {
     buttons.forEach((b) => (b.disabled = false));
     if (error instanceof Problem) return showProblem(noteOf(form), error);
-    const detail = TOLD[error.name]?.() ?? speak`This browser offers no security keys here.`;
-    showProblem(noteOf(form), { title: speak`The key gave no answer`, detail });
+    const detail = TOLD[error.name]?.() ?? speak`Security keys are not available in this browser.`;
+    showProblem(noteOf(form), { title: speak`The key did not respond`, detail });
   }
 }
 

@@ -204,7 +204,7 @@ class TakeTimeline extends HTMLElement {
     if (field) document.getElementById(field)?.focus(); // the fields are new ones, the place of the keyboard is not
     document.getElementById("h-stride").textContent = stride ? stride.side === "left" ? speak`Left stride, ${seconds(stride.start_s)} s` : speak`Right stride, ${seconds(stride.start_s)} s` : speak`Stride`;
     this.find("verdict").textContent = "";
-    if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? speak`counts` : speak`left out`));
+    if (stride) this.find("verdict").append(h("span", { class: `badge plain${stride.used ? " ok" : ""}` }, stride.used ? speak`included` : speak`excluded`));
     this.list();
   }
 
@@ -241,11 +241,11 @@ class TakeTimeline extends HTMLElement {
   }
 
   leaveOut(stride, reason) {
-    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${translate(stride.side)} stride is left out.`);
+    return this.change({ kind: "exclude_stride", side: stride.side, time_s: middle(stride), reason }, speak`The ${translate(stride.side)} stride is excluded.`);
   }
 
   count(stride) {
-    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${translate(stride.side)} stride counts.`);
+    this.change({ kind: "include_stride", side: stride.side, time_s: middle(stride) }, speak`The ${translate(stride.side)} stride is included.`);
   }
 
   askEvent(side = clock.stride?.side ?? "left", time = clock.t) {
@@ -270,14 +270,14 @@ class TakeTimeline extends HTMLElement {
       this.dropped = { event: moving.held, to: moving.at };
       moving.drop(moving.held);
       this.showHistory();
-    } else if (this.review.edits.length) this.done(() => this.review.undo(), speak`The last change is undone.`);
+    } else if (this.review.edits.length) this.done(() => this.review.undo(), speak`The last change was undone.`);
   }
 
   // While an event is held a new change has begun.
   redo() {
     if (this.holding()) return;
     if (this.dropped) this.move(this.dropped.event, this.dropped.to);
-    else if (this.review.redoable) this.done(() => this.review.redo(), speak`The change is redone.`);
+    else if (this.review.redoable) this.done(() => this.review.redo(), speak`The change was redone.`);
   }
 
   holding() {
@@ -300,7 +300,7 @@ class TakeTimeline extends HTMLElement {
     await this.attempt(() => this.numbers());
     this.dataset.took = String(Math.round(performance.now() - began));
     const used = this.review.strides.filter((s) => s.used).length;
-    this.find("said").textContent = plural(used, speak`${said} ${used} of ${this.review.strides.length} strides counts.`, speak`${said} ${used} of ${this.review.strides.length} strides count.`);
+    this.find("said").textContent = plural(used, speak`${said} ${used} of ${this.review.strides.length} strides is included.`, speak`${said} ${used} of ${this.review.strides.length} strides are included.`);
   }
 
   // The numbers are written by the server, as on the other pages. An answer to what was asked before the last change
@@ -312,7 +312,7 @@ class TakeTimeline extends HTMLElement {
     const answer = await fetch(path, { credentials: "same-origin", headers: { "X-Sagittal-Fragment": "numbers" } }).catch(() => null);
     const text = await answer?.text().catch(() => null);
     if (asked !== this.asked) return;
-    if (!answer?.ok || !text) throw { title: speak`The numbers could not be loaded`, detail: speak`Load the page again.` };
+    if (!answer?.ok || !text) throw { title: speak`The values could not be loaded`, detail: speak`Reload the page.` };
     const page = new DOMParser().parseFromString(text, "text/html");
     document.getElementById("numbers").replaceWith(page.getElementById("numbers"));
   }

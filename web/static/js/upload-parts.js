@@ -65,7 +65,7 @@ async function sendPart(path, offset, slice, signal) {
   const there = Number(told.headers.get("Upload-Offset"));
   if (!told.ok) throw new Problem(told.status, {});
   if (there === offset) throw new Problem(0, {}); // nothing of it came: wait
-  if (there < offset || there > offset + slice.size) throw new Problem(409, { detail: speak`Another page sends this file too. Try again.` });
+  if (there < offset || there > offset + slice.size) throw new Problem(409, { detail: speak`Another page is uploading this file too. Try again.` });
   return { offset: there };
 }
 

@@ -107,7 +107,7 @@ class UploadArea extends HTMLElement {
     if (item.file.size > LARGE_BYTES) {
       const stop = new AbortController();
       button.onclick = () => stop.abort();
-      const how = { signal: stop.signal, onSent: (n) => show(n, item.file.size), onWait: () => say(speak`No connection. Goes on by itself when it is back.`) };
+      const how = { signal: stop.signal, onSent: (n) => show(n, item.file.size), onWait: () => say(speak`No connection. The upload resumes automatically.`) };
       sendInParts(this.base, item, how).then(() => over(true, mb(item.file.size)), (problem) => {
         if (stop.signal.aborted) return leave();
         this.retry(item, button);
@@ -124,7 +124,7 @@ class UploadArea extends HTMLElement {
       this.retry(item, button);
       over(false, new Problem(xhr.status, body).message);
     };
-    xhr.onerror = () => { this.retry(item, button); over(false, speak`The connection broke. Try again.`); };
+    xhr.onerror = () => { this.retry(item, button); over(false, speak`The connection was lost. Try again.`); };
     xhr.onabort = leave;
     button.onclick = () => xhr.abort();
     const path = item.name.split("/").map(encodeURIComponent).join("/");

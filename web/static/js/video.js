@@ -62,7 +62,7 @@ class TakeVideo extends HTMLElement {
     const again = this.querySelector("[data-realign]");
     if (again) again.hidden = this.aligning;
     if (!this.aligning) return this.follow();
-    this.say(this.form ? "" : speak`Not aligned with the take yet.`);
+    this.say(this.form ? "" : speak`Not aligned with the trial yet.`);
     this.follow();
   }
 

@@ -80,12 +80,12 @@ def test_a_repeated_packet_is_left_out_and_said() -> None:
     counter = [*range(150), 149, *range(150, 299)]
     stream = one(mt_text(ACC, GYR, counter=counter))
     assert len(stream.t_s) == 299
-    assert codes(stream) == ["out_of_order"]
+    assert codes(stream) == ["rows_repeated"]
     assert stream.notices[0].severity == "info", "one row in 300 changes no number"
 
 
 def test_two_takes_in_one_file_are_refused() -> None:
-    with pytest.raises(FormatError, match="two takes") as e:
+    with pytest.raises(FormatError, match="two recordings") as e:
         one(mt_text(ACC, GYR, counter=[*range(1000, 1150), *range(1000, 1150)]))
     assert e.value.code == "counter_restart"
 
@@ -182,7 +182,7 @@ def test_collapsed_blanks_are_right_aligned_or_refused() -> None:
         (mt_text(ACC[:0], GYR[:0]), "empty"),
         (mt_text(np.full_like(ACC, np.nan), GYR), "missing_acc"),
         (mt_text(ACC, GYR).replace("Acc_", "FreeAcc_"), "gravity_removed"),
-        (mt_text(ACC, GYR, counter=[0] * 300), "counter_restart"),
+        (mt_text(ACC, GYR, counter=[0] * 300), "time_constant"),
         ("once upon a time\nthere was a foot\n", "unknown_format"),
     ],
 )

@@ -110,7 +110,7 @@ async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Cli
     async with clinic.client("clinician") as client:
         await client.patch(f"{API}/patients/{pid}/identity", json=WHO)
         plain = await client.get(here)
-        assert "With the name" in plain.text
+        assert "With the patient's name" in plain.text
         assert CANARY not in plain.text
         named = await client.get(here, params={"named": "true"})
         assert f"Erika {CANARY}" in named.text
@@ -125,7 +125,7 @@ async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Cli
         shown = await client.get(here, params={"named": "true"})
         assert shown.status_code == 200
         assert CANARY not in shown.text
-        assert "With the name" not in shown.text
+        assert "With the patient's name" not in shown.text
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
         assert [r["action"] for r in rows].count("identity.printed") == 1

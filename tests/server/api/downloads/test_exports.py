@@ -76,7 +76,7 @@ async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) 
         work(clinic, session)
         before = await strides()
         page = (await client.get(f"/sessions/{session}/data")).text
-        assert "For other programs" in page
+        assert "Export for other programs" in page
         assert page.count((await offered())["csv"]["file"]) == 1, "not among the results, too"
 
         counted = next(row for row in before if row["counted"] == "1")

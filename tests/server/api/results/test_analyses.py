@@ -321,7 +321,7 @@ async def test_who_reads_results_sees_comparisons_and_only_who_analyses_asks_for
             assert (await client.get(f"{visit.path}/filter-runs")).status_code == reads
             page = await client.get(f"/sessions/{visit.session}/algorithms")
             assert page.status_code == reads
-            assert "Run on this take" not in page.text
+            assert "Run on this trial" not in page.text
     async with visit.clinic.client("viewer") as client:
         assert (await client.put(f"{visit.path}/references/x.sto", content=b"x")).status_code == 403
         listed = (await client.get(f"{API}/filters")).json()

@@ -136,7 +136,7 @@ async def test_a_session_without_a_result_has_nothing_to_compare(clinic: Clinic)
 async def test_pages_of_trends_and_programme_open_for_everybody_who_may(clinic: Clinic) -> None:
     patient = _patient(clinic)
     async with clinic.client("viewer") as client:
-        assert "Nothing to follow yet" in (await client.get(f"/patients/{patient}/trends")).text
+        assert "No trend yet" in (await client.get(f"/patients/{patient}/trends")).text
         assert "No programme" in (await client.get(f"/patients/{patient}/programme")).text
     _session(clinic, patient, 0)
     async with clinic.client("viewer") as client:

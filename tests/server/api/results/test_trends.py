@@ -67,7 +67,7 @@ async def test_a_later_test_does_not_hide_how_somebody_walks(
         page = (await client.get(f"/patients/{patient}")).text
     assert [v["session_id"] for v in answer["visits"]] == [walked]
     assert answer["protocol"] == "walk"
-    assert "How it goes" in page
+    assert "Progress" in page
 
 
 async def test_an_edit_moves_the_point_of_its_visit(clinic: Clinic, patient: str) -> None:

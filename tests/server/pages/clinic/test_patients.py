@@ -36,7 +36,7 @@ async def test_the_list_says_speed_change_and_what_to_look_at(clinic: Clinic) ->
     assert re.search(r'data-show="".*?All <span class="dim num">\d+', html, re.DOTALL)
     hidden = await text_of(clinic, "/patients", "assistant")
     assert "0.95" not in hidden
-    assert "Since the visit before" not in hidden
+    assert "Since the previous visit" not in hidden
 
 
 async def test_lists_show_a_live_take_from_its_code_to_its_end(clinic: Clinic) -> None:

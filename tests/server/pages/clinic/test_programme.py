@@ -49,8 +49,8 @@ def test_what_was_done_is_missing_and_comes_next_is_said() -> None:
     assert view["summary"] == "2 of 4 visits done, 1 missing, next T3 on 16 Mar 2026"
     before, first, empty, third = view["weeks"]
     assert first["words"] == "1 of 2 trainings done, 1 missing"
-    assert third["words"] == "0 of 1 training done"
-    assert empty["words"] == "0 of 0 trainings done"
+    assert third["words"] == "0 of 1 training completed"
+    assert empty["words"] == "0 of 0 trainings completed"
     assert ([v.label for v in before["assessments"]], before["trainings"]) == (["PRE"], [])
     assert [(v["label"], v["shape"], v["word"]) for v in view["visits"]] == [
         (v.label, *STATE_WORDS[v.state]) for v in PLAN.visits

@@ -85,7 +85,7 @@ async def test_nothing_to_judge_yet(clinic: Clinic, walk: dict[str, bytes]) -> N
     stored = json.loads(files["analysis.json"])
     del stored["calibration_score"]
     html = await show(clinic, "OLD", files | {"analysis.json": json.dumps(stored).encode()})
-    assert "No calibration to judge" in html
+    assert "No calibration to check" in html
 
 
 def test_no_score_no_view() -> None:

@@ -130,4 +130,4 @@ async def test_trends_of_daily_life_alone_say_that_capacity_is_unknown(clinic: C
     html = await page(clinic, f"/patients/{patient}/trends")
     card = cut_card(html, "h-daily")
     assert "capacity is not known" in card
-    assert "Steps a day" in html
+    assert "Steps per day" in html

@@ -145,7 +145,7 @@ async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clin
     found = await read_trend(clinic, late)
     assert found is not None
     assert found[1][1:] == ["–", "0.50", "0.58", "", "+0.08 within error MDC 0.15"]
-    reason = "not measured: needs at least 10 strides that count"
+    reason = "not measured: requires at least 10 included strides"
     assert found[-1] == [f"No value: 23 Sep 2026, {reason}. Gait speed: change since 21 Oct 2026."]
     lacking = await read_trend(clinic, await add_visits(clinic, "T-6", files, [(0.5, {})] * 9 + [(None, {})]))
     assert lacking is not None

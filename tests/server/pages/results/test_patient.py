@@ -82,7 +82,7 @@ async def test_a_take_is_compared_with_the_day_before_and_not_with_the_take_befo
         clinic, "V-2", [("2026-03-02", 0.60, {}), ("2026-04-06", 0.90, {}), ("2026-04-06", 1.00, {})]
     )
     html = await text_of(clinic, f"/sessions/{last}")
-    takes = html[html.index("2 takes of this visit") :]
+    takes = html[html.index("2 trials in this visit") :]
     takes = takes[: takes.index("</details>")]
     row = next(r for r in re.findall(r"<tr>.*?</tr>", takes, re.DOTALL) if "Gait speed" in r)
     assert re.findall(r"0\.\d\d ± 0\.02|1\.00 ± 0\.02|<b>0\.95</b>", row) == [
@@ -126,7 +126,7 @@ async def test_who_may_not_plan_or_map_is_not_led_there(clinic: Clinic) -> None:
     patient, session = await walked(clinic, "V-ROLES", [("2026-03-02", 0.60, {})])
     async with clinic.client("viewer") as client:
         assert "Plan a programme" not in (await client.get(f"/patients/{patient}")).text
-        assert "A clinician starts it." in (await client.get(f"/patients/{patient}/programme")).text
+        assert "A clinician can start one." in (await client.get(f"/patients/{patient}/programme")).text
         data = (await client.get(f"/sessions/{session}/data")).text
         assert "Change mapping" not in data
     async with clinic.client("clinician") as client:

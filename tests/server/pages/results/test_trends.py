@@ -85,7 +85,7 @@ def test_days_at_home_stand_in_a_table_with_how_long_they_were_worn() -> None:
     view = view_daily_trend(None, days)
     assert [(r["day"], r["where"], r["steps"], r["cadence"], r["speed"]) for r in view["rows"]] == [
         (first, "home", "5200", None, None),
-        (second, "home, worn too short", "900", "80", None),
+        (second, "home, wear time too short", "900", "80", None),
     ]
     assert (view["has_capacity"], view["condition"]) == (False, None)
     assert view["rows"][0]["href"] == "/sessions/a"

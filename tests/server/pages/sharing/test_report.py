@@ -276,7 +276,7 @@ async def test_the_leaflet_tells_the_person_in_plain_words_what_became_of_the_la
     patient, first = await visit(clinic, "S-5")
     alone = await page(clinic, f"/sessions/{first}/leaflet", "viewer")
     assert "12.0 metres in ten seconds" in alone
-    assert alone.count("There is no earlier number to compare with.") == 3
+    assert alone.count("There is no earlier value to compare with.") == 3
     assert "estimate" not in alone
     later = {"title": "Walk", "performed_on": "2100-01-02"}
     async with clinic.client("clinician") as client:

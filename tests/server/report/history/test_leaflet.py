@@ -21,7 +21,7 @@ def test_what_was_measured_in_another_way_is_not_set_beside_it() -> None:
     told = tell(knee(40.0), knee(60.0, estimated=True))
     assert (told.now, told.before, told.estimated) == ("60 degrees", None, True)
     assert "in another way" in told.words
-    assert tell(None, knee(60.0)).words == "There is no earlier number to compare with."
+    assert tell(None, knee(60.0)).words == "There is no earlier value to compare with."
 
 
 def test_a_change_is_named_beyond_the_measurement_error_alone() -> None:

@@ -246,7 +246,7 @@ def test_one_visit_of_one_value_is_drawn_without_a_range_to_divide_by() -> None:
 @pytest.mark.parametrize(
     ("kinds", "feedback", "why"),
     [
-        (("training", "training", "training"), False, "not compared: trainings only, no assessment"),
+        (("training", "training", "training"), False, "not compared: only trainings, no assessment"),
         (("training", "training", "assessment"), False, "first value to compare with"),
         (("assessment", "training", "training"), True, "not compared: walked with feedback"),
         (("assessment", "training", "assessment"), False, ""),

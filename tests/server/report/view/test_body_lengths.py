@@ -25,12 +25,12 @@ def test_estimates_say_what_they_rest_on() -> None:
 def test_a_measured_leg_and_pelvis_are_named() -> None:
     rows = told(None, BodyMeasures(leg_m=0.9, pelvis_width_m=0.24, foot_m=0.25))
     assert "Body height" not in rows
-    assert rows["Leg"] == ("0.900 m", True, "by tape")
+    assert rows["Leg"] == ("0.900 m", True, "by tape measure")
     assert rows["Shank"] == ("0.418 m", False, "Winter 2009, from leg length")
-    assert rows["Foot"] == ("0.250 m", True, "by tape")
+    assert rows["Foot"] == ("0.250 m", True, "by tape measure")
     assert rows["Between the hip centres"] == ("0.173 m", True, BY_PELVIS)
 
 
 def test_a_height_that_nobody_gave_is_assumed_and_nothing_is_shown_without_a_body() -> None:
-    assert told(None, BodyMeasures())["Body height"] == ("1.70 m", False, "nobody gave one")
+    assert told(None, BodyMeasures())["Body height"] == ("1.70 m", False, "none entered")
     assert view_lengths(None) == ()

@@ -104,8 +104,8 @@ def test_what_cannot_be_judged_says_why() -> None:
         prescription(), GuardState(SideEffect(), SideEffect(0.5, reason="no_limit")), METRES
     )
     assert (few.kind, few.text) == ("none", "–")
-    assert few.words == ("not judged: needs 10 strides at the start and 10 after them, on this side")
-    assert (unlimited.kind, unlimited.change, unlimited.words) == ("none", 0.5, "no limit is prescribed")
+    assert few.words == ("not assessed: needs 10 strides at the start and 10 after them, on this side")
+    assert (unlimited.kind, unlimited.change, unlimited.words) == ("none", 0.5, "no limit prescribed")
 
 
 def retained(now: float | None, end: float | None, name: str = NAME) -> Retention | None:
@@ -150,7 +150,7 @@ def test_a_parameter_without_a_known_error_says_so() -> None:
     found = retained(1.2, 1.1, "stride_time_s")
     assert found is not None
     assert (found.limit, found.limit_source) == (None, None)
-    assert found.verdict == "no measurement error of this parameter is known"
+    assert found.verdict == "the measurement error of this parameter is unknown"
 
 
 def test_retention_needs_both_ends() -> None:

@@ -81,6 +81,6 @@ def test_a_level_shows_the_change_from_standing_and_says_so() -> None:
     rows = {r.name: r for _, found in add_changes(groups, parameter_changes(before, now)) for r in found}
     told = rows["knee_flexion_max_swing_anatomical_deg"].change
     assert [(w.side, w.size, w.about) for w in told] == [
-        ("left", "+11.7", "from standing"), ("right", "+11.7", "from standing")
+        ("left", "+11.7", "relative to standing"), ("right", "+11.7", "relative to standing")
     ]  # fmt: skip
     assert rows["knee_flexion_ic_anatomical_deg"].change == ()

@@ -156,7 +156,7 @@ def test_a_missing_number_gives_its_reason_never_zero() -> None:
         of("stance_pct", "left", None, "no_terminal_contact"),
         of("stance_pct", "right", None, "no_terminal_contact"),
     )
-    assert both[0].reason == "not measured: no foot-off was found"
+    assert both[0].reason == "not measured: no foot-off detected"
     assert both[0].left is None
     one = rows_of(of("stance_pct", "left", 61.0), of("stance_pct", "right", None, "no_strides"))[0]
     assert one.reason is None
@@ -169,7 +169,7 @@ def test_a_side_withheld_beside_an_estimated_one_says_why() -> None:
     left = Parameter(name, "left", 9, 4.8, 5.6, "deg", estimated=True)
     right = Parameter(name, "right", 0, None, None, "deg", "at_bound", estimated=True)
     (found,) = parameter_rows((left, right))
-    assert found.side_reason == "withheld: the leg model's knee rests on its limit"
+    assert found.side_reason == "not reported: the knee of the leg model is at its limit"
     assert found.difference == f"right {found.side_reason}"
     assert (found.low_confidence, found.reason) == (True, None)
 
@@ -204,7 +204,7 @@ def test_box_counts_strides_and_names_the_worst_sensor(bundle: Bundle) -> None:
     box = report_model(bundle).quality
     items = {i.label: i for i in box.items}
     assert (box.kind, box.word) == ("ok", "Good data")
-    strides = items["Strides used"]
+    strides = items["Strides included"]
     used = len(bundle.strides.select_used("left"))
     assert (strides.left, strides.left_of) == (used, used + 1)
     assert (items["Lost samples"].value, items["Lost samples"].extra) == ("0.3 %", "at most, right shank")

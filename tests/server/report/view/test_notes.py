@@ -46,7 +46,7 @@ def test_own_controls_say_how_many_they_are() -> None:
     )
     assert norm_note([], [], nobody, controls(note="small_group")).endswith("12 people, a small group.")
     few = controls(n=3, reason="few_controls")
-    assert norm_note([], [], nobody, few) == "Own controls who walk as fast: 3, too few to compare with."
+    assert norm_note([], [], nobody, few) == "Own controls at the same speed: 3, too few for a comparison."
     assert norm_note([], [], nobody) == ""
 
 

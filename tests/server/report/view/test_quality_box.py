@@ -23,7 +23,7 @@ ENDED = Notice(
     18.0,
 )
 GAP = Notice(
-    "gap", "shank_l has no data in 1 stretch(es) of 0.1 s and more, 56.2 % of the take.", "shank_l", 18.0
+    "gap", "shank_l has no data for 1 stretch(es) of 0.1 s and more, 56.2 % of the trial.", "shank_l", 18.0
 )
 FAILED = Notice(
     "sensor_failed", "The shank_l sensor can be used for 44% of the take, so it is left out.", "shank_l"
@@ -32,7 +32,7 @@ STUCK = Notice("channel_stuck", "The gyroscope of foot_l is stuck at one value f
 FOOT_FAILED = Notice("sensor_failed", "The foot_l sensor can be used for 30% of the take.", "foot_l")
 NO_FOOT = Notice("foot_missing", "No sensor on the left foot, or no sample of it.", "foot_l")
 OTHER = Notice("rates_differ", "Sensors run at different rates.")
-POOR = {"level": "poor", "reasons": ["shank_l has no data in 56 % of the take."]}
+POOR = {"level": "poor", "reasons": ["shank_l has no data for 56 % of the trial."]}
 
 
 def texts(notices: Sequence[Notice]) -> list[str]:

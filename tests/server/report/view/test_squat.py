@@ -71,7 +71,8 @@ def test_bends_with_the_foot_off_the_floor_are_no_squats_and_are_told(bundle: Bu
     assert len(found.rows) == 1
     assert found.title == "left leg"
     assert found.not_listed == (
-        "Bends with the foot off the floor are no squats: 1 of the left knee and 2 of the right knee."
+        "Knee flexion with the foot off the floor is not counted as a squat: 1 of the left knee and 2 "
+        "of the right knee."
     )
     assert found.to_json()["bends_with_lifted_foot"] == {"left": 1, "right": 2}
     assert view(bundle, squat("left", 0.0)).not_listed == ""
@@ -93,7 +94,7 @@ def test_curves_are_means_of_the_squats_that_count_and_say_where_the_level_is_un
 def test_an_angle_that_is_not_known_throughout_any_squat_has_no_curve_but_a_reason(bundle: Bundle) -> None:
     lost = angles(hip_adduction_l=np.where(angles().t_s % 2.0 < 0.5, np.nan, 0.0))
     found = view(bundle, squat("left", 0.0), moved=lost)
-    assert [c["reason"] for c in found.charts] == [None, "not known throughout any squat"]
+    assert [c["reason"] for c in found.charts] == [None, "not available throughout any squat"]
     assert found.means_deg["hip_adduction"] == {}
 
 

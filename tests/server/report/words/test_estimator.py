@@ -55,9 +55,9 @@ def test_of_each_quantity_the_worst_is_shown_with_its_place_and_limit() -> None:
     view = estimator_view(section())
     assert view is not None
     first, second = view.health
-    assert (first.label, first.text, first.limit) == ("Joint ends apart", "19\u202fmm", "≤ 25\u202fmm")
+    assert (first.label, first.text, first.limit) == ("Joint separation", "19\u202fmm", "≤ 25\u202fmm")
     assert first.where == "right thigh and right shank"
-    assert (second.label, second.limit) == ("Heading uncertain by", "")
+    assert (second.label, second.limit) == ("Heading uncertainty", "")
 
 
 def test_what_could_not_be_measured_is_worse_than_any_value() -> None:
@@ -129,8 +129,8 @@ def test_an_angle_of_the_model_has_no_norm(make_bundle: MakeBundle) -> None:
 
 def test_a_reduced_take_is_said_in_the_quality_box(make_bundle: MakeBundle) -> None:
     model = report_model(make_bundle(estimator=section(reduced="sensor_failed")))
-    (item,) = (i for i in model.quality.items if i.label == "Poses by")
-    assert (item.kind, item.extra) == ("warn", "reduced: a sensor failed in this take")
+    (item,) = (i for i in model.quality.items if i.label == "Pose estimator")
+    assert (item.kind, item.extra) == ("warn", "reduced: a sensor failed in this trial")
 
 
 def test_the_side_that_sensors_measure_keeps_its_own_confidence(make_bundle: MakeBundle) -> None:

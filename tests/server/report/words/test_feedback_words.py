@@ -84,10 +84,10 @@ def test_what_is_shown_and_of_which_strides() -> None:
 
 def test_zone_and_level_say_their_width_and_when_it_becomes_harder() -> None:
     assert words("Zone", band_sd=1.5, progression={"sd_per_level": 0.5}) == (
-        "target ± 1.5 SD; one level is 0.5 SD wider"
+        "target ± 1.5 SD; each level is 0.5 SD wider"
     )
     assert words("Level", progression={"automatic": False, "start_level": 3}) == (
-        "begins at level 3; changed by hand"
+        "starts at level 3; changed manually"
     )
     assert words("Level") == (
         f"begins as hard as the last walk allows; harder when more than 70{NBSP}% of 20 strides are in the "
@@ -96,7 +96,7 @@ def test_zone_and_level_say_their_width_and_when_it_becomes_harder() -> None:
 
 
 def test_the_end_is_what_comes_first_or_the_therapist() -> None:
-    assert words("Ends") == "when the therapist ends it"
+    assert words("Ends") == "when the therapist stops it"
     rule = {"max_minutes": 2.5, "max_strides": 1, "gps_rise_deg": 3.2}
     assert words("Ends", stop_rule=rule) == (
         "after 2.5 min, after 1 stride, when the sagittal profile score rises by 3.2°"

@@ -30,8 +30,8 @@ def test_what_cannot_be_said_says_why(make_bundle: MakeBundle) -> None:
     limits = report_model(make_bundle()).limits
     assert limits is not None
     notes = {row.name: row.note for row in limits.unknown}
-    assert "goniometer" in notes["Least knee flexion in stance"]
-    assert notes["Swing path outward"] == "no sensor on this foot"
+    assert "goniometer" in notes["Minimum knee flexion in stance"]
+    assert notes["Circumduction"] == "no sensor on this foot"
 
 
 def test_estimated_angles_are_held_against_nothing(make_bundle: MakeBundle) -> None:

@@ -7,16 +7,16 @@ const PIECE_MS = 1000;
 const RESERVE = 0.98; // of the server's limit
 const FORMATS = ["video/webm;codecs=vp8", "video/webm;codecs=vp9", "video/webm", "video/mp4"];
 const REASONS = {
-  NotAllowedError: speak`The camera was not allowed. Allow it in the browser's settings of this page, then tick the box again.`,
+  NotAllowedError: speak`Camera access was denied. Allow it in the browser's settings for this page, then tick the box again.`,
   NotFoundError: speak`This device has no camera.`,
-  NotReadableError: speak`Another program uses the camera. Close it, then tick the box again.`,
+  NotReadableError: speak`Another program is using the camera. Close it, then tick the box again.`,
 };
 
 // Why there is no camera here, or null.
 function whyNot() {
-  if (!window.isSecureContext) return speak`Filming needs the address with https.`;
-  if (!navigator.mediaDevices?.getUserMedia || !window.MediaRecorder) return speak`This browser cannot film.`;
-  return FORMATS.some((format) => MediaRecorder.isTypeSupported(format)) ? null : speak`This browser cannot film.`;
+  if (!window.isSecureContext) return speak`Filming requires an https address.`;
+  if (!navigator.mediaDevices?.getUserMedia || !window.MediaRecorder) return speak`This browser cannot record video.`;
+  return FORMATS.some((format) => MediaRecorder.isTypeSupported(format)) ? null : speak`This browser cannot record video.`;
 }
 
 export class Camera {
@@ -46,7 +46,7 @@ export class Camera {
     try {
       this.outbox = await FilmOutbox.open(() => this.sent());
     } catch {
-      this.problem = speak`This browser keeps nothing for this page, so it cannot film.`;
+      this.problem = speak`This browser does not store data for this page, so it cannot record video.`;
     }
   }
 
@@ -72,7 +72,7 @@ export class Camera {
       stream.getVideoTracks()[0].addEventListener("ended", () => this.gone());
       this.$("preview").srcObject = stream;
     } catch (error) {
-      this.problem = REASONS[error.name] ?? speak`The camera does not work: ${error.message}`;
+      this.problem = REASONS[error.name] ?? speak`Camera error: ${error.message}`;
       this.$("consent").checked = false;
     }
     this.draw();
@@ -80,7 +80,7 @@ export class Camera {
 
   // The camera was taken away: unplugged, or by another program.
   async gone() {
-    this.problem = speak`The camera has gone. The take goes on without it.`;
+    this.problem = speak`The camera was disconnected. Recording continues without video.`;
     await this.end();
   }
 
@@ -111,7 +111,7 @@ export class Camera {
       recorder.start(PIECE_MS);
       this.recorder = recorder;
     } catch (error) {
-      this.problem = speak`The camera does not work: ${error.message}`;
+      this.problem = speak`Camera error: ${error.message}`;
       this.close();
     }
     this.draw();
@@ -120,13 +120,13 @@ export class Camera {
   async keep(piece) {
     if (!piece.size || !this.outbox.current) return;
     if (this.outbox.bytes + piece.size <= this.limit) return this.outbox.add(piece);
-    this.problem = speak`The film has reached its limit and ends here. The take goes on.`;
+    this.problem = speak`The video reached its size limit and stopped. Recording continues.`;
     await this.end();
   }
 
   async full(error) {
-    const words = error.name === "QuotaExceededError" ? speak`There is no more room on this tablet.` : error.message;
-    this.problem = speak`The film ends here: ${words} The take goes on.`;
+    const words = error.name === "QuotaExceededError" ? speak`This tablet has no storage left.` : error.message;
+    this.problem = speak`The video stopped: ${words} Recording continues.`;
     await this.end();
   }
 
@@ -162,7 +162,7 @@ export class Camera {
     this.$("consent").disabled = Boolean(whyNot());
     this.$("turn").hidden = !choosing || !on;
     this.$("hide").hidden = !on;
-    set(this.$("hide"), this.hidden ? speak`Show the picture` : speak`Hide the picture`);
+    set(this.$("hide"), this.hidden ? speak`Show camera picture` : speak`Hide camera picture`);
     this.$("preview").hidden = !on || Boolean(this.hidden);
     this.$("stop-film").hidden = !films;
     this.$("films").hidden = !films;
@@ -174,9 +174,9 @@ export class Camera {
 
   onTheWay() {
     const { held, left } = this.outbox ?? {};
-    if (held) return speak`${fixed(held / 1e6, 1)} MB of the film are on their way. Leave this page open.`;
+    if (held) return speak`${fixed(held / 1e6, 1)} MB of video still to upload. Keep this page open.`;
     if (!left) return null;
-    return this.state === "running" ? speak`Filming has ended. What was filmed is kept with the take.` : speak`The film is being set beside the take.`;
+    return this.state === "running" ? speak`Filming has ended. The video is stored with the trial.` : speak`The video is being added to the trial.`;
   }
 }
 

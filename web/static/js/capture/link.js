@@ -191,8 +191,8 @@ export class Link {
     const seconds = `${held < 10 ? fixed(held, 1) : Math.round(held)} s`;
     if (this.state === "finished") return { kind: "ok", text: speak`On the server` };
     if (this.state === "refused") return { kind: "bad", text: speak`Not connected` };
-    if (away > 10) return { kind: "bad", text: speak`No connection, ${seconds} kept here` };
-    if (this.state !== "open") return held > 0.5 ? { kind: "warn", text: speak`Keeping ${seconds} here` } : { kind: "run", text: speak`Connecting` };
+    if (away > 10) return { kind: "bad", text: speak`No connection, ${seconds} stored here` };
+    if (this.state !== "open") return held > 0.5 ? { kind: "warn", text: speak`Storing ${seconds} here` } : { kind: "run", text: speak`Connecting` };
     return held > 2 ? { kind: "run", text: speak`Sending ${seconds}` } : { kind: "ok", text: speak`Connected` };
   }
 }

@@ -268,7 +268,7 @@ class CapturePage extends HTMLElement {
     try {
       await act();
     } catch (error) {
-      this.say({ title: speak`That did not work`, detail: error.message });
+      this.say({ title: speak`Action failed`, detail: error.message });
     }
   }
 

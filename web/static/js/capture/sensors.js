@@ -17,7 +17,7 @@ export class SensorList {
 
   // Part and side apart, as "Thigh" and L; the names of the server begin with the side.
   words(segment) {
-    if (!segment) return speak`Not placed`;
+    if (!segment) return speak`Not assigned`;
     return capitalise(withoutSide(this.names[segment]));
   }
 
@@ -48,7 +48,7 @@ export class SensorList {
     set(part("rate"), `${Math.round(rate)} Hz`);
     for (const button of [part("place"), part("place-too")]) {
       button.disabled = fixed;
-      const where = sensor.segment ? this.names[sensor.segment] : speak`not placed`;
+      const where = sensor.segment ? this.names[sensor.segment] : speak`not assigned`;
       button.setAttribute("aria-label", speak`Sensor ${sensor.id}: ${where}. Change`);
       button.onclick = () => this.ask(sensor);
     }

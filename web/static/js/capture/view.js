@@ -77,10 +77,10 @@ export class View {
     set(this.part("add-word"), ADD[kind] ?? "");
     const worn = rows.filter(({ sensor }) => sensor.segment).length;
     const n = source?.copies?.length ?? 0;
-    const copies = n ? plural(n, speak`, 1 copy left out`, speak`, ${n} copies left out`) : "";
+    const copies = n ? plural(n, speak`, 1 copy excluded`, speak`, ${n} copies excluded`) : "";
     const counted = speak`${ready.length} of ${rows.length} ready${copies}`;
     const recorded = paused ? speak`${rows.length} of ${wanted(record)} connected` : speak`${worn} recorded`;
-    set(this.part("sum"), !source ? speak`Where do they come from?` : prepare ? counted : recorded);
+    set(this.part("sum"), !source ? speak`Source of the sensors` : prepare ? counted : recorded);
     const before = prepare ? rows.filter(({ sensor }) => sensor.segment && sensor.segment === sensor.asBefore).length : 0;
     this.part("as-before").hidden = !before;
     set(this.part("as-before-say"), words.asBefore(before));
@@ -94,18 +94,18 @@ export class View {
     if (this.part("axes").hidden) return;
     const { test, axes } = source;
     if (axes) {
-      set(this.part("axes-say"), speak`The axes of this device are checked`);
+      set(this.part("axes-say"), speak`Axes of this device checked`);
       const fit = Math.max(1, Math.round(axes.errorDeg));
-      set(this.part("axes-more"), speak`Turning it agreed with gravity within ${fit}°. This is remembered until the browser changes.`);
+      set(this.part("axes-more"), speak`Rotation agreed with gravity within ${fit}°. This is remembered until the browser is updated.`);
     } else if (source.isMute()) {
-      set(this.part("axes-say"), speak`This device sends no motion`);
+      set(this.part("axes-say"), speak`This device sends no motion data`);
       set(this.part("axes-more"), speak`Use a phone or a tablet with a motion sensor, or choose another source.`);
     } else if (test.problem) {
-      set(this.part("axes-say"), speak`The check did not work`);
+      set(this.part("axes-say"), speak`The check failed`);
       set(this.part("axes-more"), test.problem);
     } else {
       set(this.part("axes-say"), speak`${test.still.length + 1} of ${POSES.length}: ${test.pose.words}`);
-      set(this.part("axes-more"), speak`Hold it still for a second. Browsers disagree about the axes, so they are measured once.`);
+      set(this.part("axes-more"), speak`Hold it still for a second. Browsers define the axes differently, so they are measured once.`);
     }
     this.part("axes-again").hidden = !axes && !test.problem;
   }
@@ -156,10 +156,10 @@ export class View {
   button({ state, source, ready, rows, paused, room }) {
     const go = this.part("go");
     const n = ready.length;
-    const missing = !source ? speak`Choose where sensors come from` : rows.length ? this.reason(source) : speak`Add a sensor`;
+    const missing = !source ? speak`Choose the source of the sensors` : rows.length ? this.reason(source) : speak`Add a sensor`;
     const start = n ? plural(n, speak`Start with 1 sensor`, speak`Start with ${n} sensors`) : missing;
     const word = {
-      loading: speak`One moment`, stuck: speak`Save or delete what is left`, pairing: speak`Enter the code`, prepare: start,
+      loading: speak`One moment`, stuck: speak`Save or delete the remaining data`, pairing: speak`Enter the code`, prepare: start,
       sending: speak`Sending`, done: speak`Start another`, running: paused ? speak`Connect the sensors again` : speak`Stop`,
     }[state];
     set(this.part("go-word"), word);
@@ -172,7 +172,7 @@ export class View {
 
   reason(source) {
     if (source.kind === "device_motion" && !source.axes) return speak`Check its axes first`;
-    return speak`Say where the sensors are worn`;
+    return speak`Assign the sensors to segments`;
   }
 }
 

@@ -2,9 +2,9 @@
 import { speak, translate } from "./words.js";
 export class Problem extends Error {
   constructor(status, body) {
-    super(body.detail || body.title || speak`The server answered ${status}.`);
+    super(body.detail || body.title || speak`The server responded with ${status}.`);
     this.status = status;
-    this.title = body.title || speak`That did not work`;
+    this.title = body.title || speak`Action failed`;
     this.detail = body.detail || "";
     this.code = body.code || String(status);
   }
@@ -49,7 +49,7 @@ export async function request(method, path, body) {
  */
 export function showProblem(note, problem) {
   note.hidden = false;
-  note.querySelector("[data-title]").textContent = translate(problem.title) || speak`That did not work`;
+  note.querySelector("[data-title]").textContent = translate(problem.title) || speak`Action failed`;
   note.querySelector("[data-detail]").textContent = translate(problem.detail);
   note.scrollIntoView({ block: "nearest" });
   if (problem.code !== "code_needed") return;

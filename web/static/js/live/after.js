@@ -14,13 +14,13 @@ export class After {
     const away = state.problem === "node_away" && !state.recording;
     const empty = !state.count && !state.recording && !away;
     const part = state.state === "closed";
-    say(this.root.querySelector("[data-over-title]"), away ? speak`The take is ended` : empty ? speak`Nothing was recorded` : speak`Recording is saved`);
-    say(this.root.querySelector("[data-over-words]"), away ? speak`The server of this take is away. What had arrived is stored and analysed when it is back.`
-      : empty ? speak`No data came before the end.`
-      : part ? speak`It was ended here with what had arrived. Analysis is running; the session page opens when it is done.`
-      : speak`Analysis is running; the session page opens when it is done.`);
+    say(this.root.querySelector("[data-over-title]"), away ? speak`The recording has ended` : empty ? speak`Nothing was recorded` : speak`Recording saved`);
+    say(this.root.querySelector("[data-over-words]"), away ? speak`The server of this recording is unavailable. Data received so far is stored and will be analysed when it is back.`
+      : empty ? speak`No data was received.`
+      : part ? speak`It was ended here with the data received so far. Analysis is running; the visit page opens when it is done.`
+      : speak`Analysis is running; the visit page opens when it is done.`);
     this.root.querySelector("[data-do=again]").hidden = watched && !empty && !away;
-    if (!watched && !empty && !away) return say(this.root.querySelector("[data-over-words]"), speak`This session has its recording. Another one takes its place.`);
+    if (!watched && !empty && !away) return say(this.root.querySelector("[data-over-words]"), speak`This visit already has a recording. A new one replaces it.`);
     if (!empty && !away && !this.following) await this.follow();
   }
 

@@ -12,7 +12,7 @@ const SAYS = {
   unknown: speak`The walk is being recorded, without a live estimate.`,
   waiting: speak`Waiting until every sensor sends data.`,
   stand: speak`Please stand still, feet as in walking, and look ahead.`,
-  walk: speak`Now walk straight on at a comfortable pace.`,
+  walk: speak`Now walk straight ahead at a comfortable pace.`,
 };
 
 const BEFORE = new Set(["preparing", "unknown", "waiting"]); // nobody has looked at how the person stands
@@ -73,7 +73,7 @@ class LiveCalibration extends HTMLElement {
   }
 
   notes(problem, notices) {
-    const wanted = [...(problem ? [{ severity: "warn", message: problem.message, title: speak`Calibration starts again` }] : []), ...notices];
+    const wanted = [...(problem ? [{ severity: "warn", message: problem.message, title: speak`Calibration restarts` }] : []), ...notices];
     const box = this.querySelector("[data-cal-notes]");
     const key = JSON.stringify(wanted);
     if (box.dataset.key === key) return;

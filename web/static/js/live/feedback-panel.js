@@ -3,8 +3,8 @@ import { setState } from "./shapes.js";
 import { number, say, withUnit } from "./words.js";
 import { plural, speak } from "../common/words.js";
 
-const STOPS = { max_strides: speak`The number of strides is reached.`, max_minutes: speak`The time is over.`, gps_rise: speak`The walk as a whole changed too much.` };
-const NOT_JUDGED = { too_few_strides: speak`too few strides yet`, joint_missing: speak`not measured`, both_sides_trained: speak`both are trained`, no_limit: speak`no limit known` };
+const STOPS = { max_strides: speak`The number of strides was reached.`, max_minutes: speak`The time is up.`, gps_rise: speak`Overall gait changed too much.` };
+const NOT_JUDGED = { too_few_strides: speak`too few strides yet`, joint_missing: speak`not measured`, both_sides_trained: speak`both are trained`, no_limit: speak`no known limit` };
 
 class LiveFeedback extends HTMLElement {
   // prescription: content of the record | null; term: {label, unit, digits}
@@ -37,8 +37,8 @@ class LiveFeedback extends HTMLElement {
 
   schedule(state) {
     if (state.paused) return speak`paused`;
-    if (state.phase === "baseline") return speak`first strides, without`;
-    if (state.phase === "retention") return speak`retention test, without`;
+    if (state.phase === "baseline") return speak`first strides, without feedback`;
+    if (state.phase === "retention") return speak`retention test, without feedback`;
     const kind = this.prescription.schedule?.kind;
     if (kind === "every" || state.share_pct === 100) return speak`every stride`;
     return speak`${kind === "fading" ? speak`fading, ` : ""}${number(state.share_pct)}\u2009% of strides`;
@@ -60,7 +60,7 @@ class LiveFeedback extends HTMLElement {
     let state = out.firstElementChild;
     if (!state) out.replaceChildren((state = document.createElement("span")));
     if (guard.other?.beyond) setState(state, "warn", speak`changed by ${withUnit(guard.other.change, this.term)}`);
-    else if (guard.gps?.beyond) setState(state, "warn", speak`walk changed, sagittal score +${number(guard.gps.change, 1)}°`);
+    else if (guard.gps?.beyond) setState(state, "warn", speak`gait changed, sagittal score +${number(guard.gps.change, 1)}°`);
     else if (guard.state === "ok") setState(state, "ok", speak`no side effect`);
     else setState(state, "none", NOT_JUDGED[guard.other?.reason] ?? speak`not known yet`);
   }
@@ -70,8 +70,8 @@ class LiveFeedback extends HTMLElement {
     const p = this.prescription?.progression;
     if (!p?.automatic || state.phase !== "training" || state.in_zone === null) return "";
     const needed = Math.floor(p.share * p.window + 1e-9);
-    if (state.window_n < p.window) return speak`A decision on the level needs ${p.window} strides; ${state.window_n} so far.`;
-    return state.level > 0 ? speak`More than ${needed} of ${p.window} in the zone: the next level follows.` : speak`The hardest level.`;
+    if (state.window_n < p.window) return speak`${p.window} strides are needed to adjust the level; ${state.window_n} so far.`;
+    return state.level > 0 ? speak`More than ${needed} of ${p.window} in the zone: next level.` : speak`Most difficult level.`;
   }
 }
 

@@ -23,8 +23,8 @@ class LiveTest extends HTMLElement {
 
   // No estimate yet, or none at all: nobody looks whether the person moves.
   wait(preparing) {
-    setState(this.at("phase"), "none", preparing ? speak`Please wait` : speak`Not followed`);
-    say(this.at("say"), preparing ? speak`Please wait and keep still. The live estimate is not ready yet.` : speak`The test is recorded and measured afterwards. Press STOP at its end.`);
+    setState(this.at("phase"), "none", preparing ? speak`Please wait` : speak`Not tracked live`);
+    say(this.at("say"), preparing ? speak`Please wait and keep still. The live estimate is not ready yet.` : speak`The test is being recorded and will be analysed afterwards. Press STOP at the end.`);
   }
 
   // The estimate has ended in mid-test: what the clock shows is no result, and nothing here can begin it again.
@@ -32,7 +32,7 @@ class LiveTest extends HTMLElement {
     this.found = null;
     this.toggleAttribute("data-stopped", true);
     setState(this.at("phase"), "bad", speak`Live view stopped`);
-    say(this.at("say"), speak`Go on with the test. It is recorded and measured afterwards. Press STOP at its end.`);
+    say(this.at("say"), speak`Continue the test. It is being recorded and will be analysed afterwards. Press STOP at the end.`);
     for (const hidden of [this.querySelector("[data-do=test-go]"), this.at("anew"), this.at("problem"), this.at("progress"), this.at("count")]) hidden.hidden = true;
   }
 
@@ -82,7 +82,7 @@ class LiveTest extends HTMLElement {
     const total = found.figures.find((f) => f.name === this.test.total);
     const known = total?.value !== null && total?.value !== undefined;
     say(this.at("total"), known ? number(total.value, this.term.digits) : "–");
-    say(this.at("total-note"), [known ? "" : translate(total?.reason), known && total.plus_minus ? `± ${withUnit(total.plus_minus, this.term)}` : "", found.corrected ? speak`start or end set by hand` : ""].filter(Boolean).join(", "));
+    say(this.at("total-note"), [known ? "" : translate(total?.reason), known && total.plus_minus ? `± ${withUnit(total.plus_minus, this.term)}` : "", found.corrected ? speak`start or end set manually` : ""].filter(Boolean).join(", "));
     this.at("segments-box").hidden = !found.segments.length;
     this.at("segments").replaceChildren(...found.segments.map((s) => {
       const tr = document.createElement("tr");
@@ -99,7 +99,7 @@ class LiveTest extends HTMLElement {
   typed() {
     const [start, end] = [...this.querySelectorAll("input")].map((i) => i.valueAsNumber);
     const fine = end > start;
-    this.querySelector("#test-end").setCustomValidity(fine ? "" : speak`The end comes after the start.`);
+    this.querySelector("#test-end").setCustomValidity(fine ? "" : speak`The end must be after the start.`);
     return fine ? { start_s: start, end_s: end } : null;
   }
 

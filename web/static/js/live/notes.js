@@ -38,9 +38,9 @@ export class Notes {
 
   tablet(state) {
     if (state.problem === "node_away" && state.state !== "closed")
-      this.put("tablet", "bad", speak`The server of this take is away.`, speak`The tablet goes on recording; what is kept stays kept. This page goes on when that server is back.`, { do: "close", word: speak`End without the tablet` });
+      this.put("tablet", "bad", speak`The server of this recording is unavailable.`, speak`The tablet continues recording and stored data is safe. This page resumes when the server is back.`, { do: "close", word: speak`End without the tablet` });
     else if (state.state === "streaming" && state.tablet !== "connected")
-      this.put("tablet", "warn", speak`The tablet is not connected.`, speak`It goes on recording and keeps everything; what is missing comes when it is back. Nothing is lost.`, { do: "close", word: speak`End without the tablet` });
+      this.put("tablet", "warn", speak`The tablet is not connected.`, speak`It continues recording and stores everything; missing data is sent when it reconnects. Nothing is lost.`, { do: "close", word: speak`End without the tablet` });
     else this.take("tablet");
   }
 
@@ -51,24 +51,24 @@ export class Notes {
     const waits = state.state === "streaming" && state.estimate === "preparing";
     this.waitsSince = waits ? this.waitsSince ?? performance.now() : undefined;
     if (waits && performance.now() - this.waitsSince > PREPARED_MS)
-      this.put("estimate", "warn", speak`The live estimate is still being prepared.`, speak`After a start of the server that takes up to a minute. The walk is recorded meanwhile, and the estimate catches up.`);
+      this.put("estimate", "warn", speak`The live estimate is still starting.`, speak`This takes up to a minute after a server start. The walk is recorded meanwhile and the estimate catches up.`);
     else this.take("estimate");
   }
 
   // STOP without a tablet: the person decides, because what the tablet still holds would stay there.
   withoutTablet() {
-    this.put("tablet", "warn", speak`The tablet cannot hear STOP now.`, speak`Press STOP on the tablet, or end here with what has arrived; the rest stays on the tablet.`, { do: "close", word: speak`End without the tablet` });
+    this.put("tablet", "warn", speak`STOP cannot reach the tablet at the moment.`, speak`Press STOP on the tablet, or end here with the data received so far; the rest stays on the tablet.`, { do: "close", word: speak`End without the tablet` });
   }
 
   line(line) {
-    if (line === "lost") this.put("line", "bad", speak`No connection to the server.`, speak`The tablet goes on recording. This page comes back by itself.`);
-    else if (line === "hidden") this.put("line", "bad", speak`You may no longer open this patient.`, speak`The recording goes on.`);
-    else if (line === "refused") this.put("line", "bad", speak`You are signed out.`, speak`Sign in again to see the walk; the recording goes on.`);
+    if (line === "lost") this.put("line", "bad", speak`No connection to the server.`, speak`The tablet continues recording. This page reconnects automatically.`);
+    else if (line === "hidden") this.put("line", "bad", speak`You no longer have access to this patient.`, speak`Recording continues.`);
+    else if (line === "refused") this.put("line", "bad", speak`You are signed out.`, speak`Sign in again to see the walk; recording continues.`);
     else this.take("line");
   }
 
   problem(problem) {
-    const note = this.put("problem", "bad", translate(problem.title) || speak`That did not work`, translate(problem.detail));
+    const note = this.put("problem", "bad", translate(problem.title) || speak`Action failed`, translate(problem.detail));
     setTimeout(() => this.shown.get("problem") === note && this.take("problem"), NOTICE_MS);
   }
 

@@ -149,9 +149,9 @@ class LivePage extends HTMLElement {
     const words = this.querySelector("[data-cover-words]");
     say(this.querySelector("[data-cover-title]"), this.stopping ? speak`Stopping… saving` : speak`Paused: no new data`);
     const tell = () => {
-      if (this.stopping) return say(words, this.feed.state?.tablet === "connected" ? speak`The tablet sends what is left. This takes a moment.` : speak`The tablet does not answer. It keeps what it measured and sends it when it is back.`);
-      const lost = this.feed.line !== "open" ? speak`The line to the server is lost. ` : this.feed.state?.tablet === "lost" ? speak`The tablet does not answer. ` : "";
-      say(words, speak`${lost}The last data came ${number(this.feed.age / 1000, 1)} s ago; feedback waits. The tablet keeps what it measures.`);
+      if (this.stopping) return say(words, this.feed.state?.tablet === "connected" ? speak`The tablet is sending the remaining data. This takes a moment.` : speak`The tablet is not responding. It stores its data and sends it when it reconnects.`);
+      const lost = this.feed.line !== "open" ? speak`The connection to the server was lost. ` : this.feed.state?.tablet === "lost" ? speak`The tablet is not responding. ` : "";
+      say(words, speak`${lost}The last data arrived ${number(this.feed.age / 1000, 1)} s ago; feedback is paused. The tablet stores its data.`);
     };
     tell();
     this.staleClock = setInterval(tell, 500);

@@ -57,8 +57,8 @@ export class Pairing {
   #tick() {
     const out = this.root.querySelector("[data-code-left]");
     if (this.ends === undefined || !out) return;
-    if (this.ends === null) return say(out, speak`The code was shown when the take was opened. Ask for a new one.`);
+    if (this.ends === null) return say(out, speak`The code was shown when the recording was opened. Request a new one.`);
     const left = (this.ends - Date.now()) / 1000;
-    say(out, left > 0 ? speak`Valid for ${formatClock(left)}.` : speak`The code has expired. Ask for a new one.`);
+    say(out, left > 0 ? speak`Valid for ${formatClock(left)}.` : speak`The code has expired. Request a new one.`);
   }
 }

@@ -21,7 +21,7 @@ export const HELD = {
   waiting: [speak`One moment`, speak`The sensors are getting ready.`],
   stand: [speak`Stand still`, speak`Look straight ahead.`],
   walk: [speak`Walk on`, speak`A few steps, straight ahead.`],
-  stale: [speak`Short pause`, speak`The picture comes back by itself.`],
+  stale: [speak`Short pause`, speak`The picture will return automatically.`],
   paused: [speak`Short pause`, speak`Walk as you like.`],
   none: [speak`Walk as you like`, ""],
   stopped: [speak`Well done`, speak`That was the training.`],

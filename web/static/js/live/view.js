@@ -52,7 +52,7 @@ class LiveView extends HTMLElement {
       if (answer.ok) this.#load(body.src);
       else problem = body.detail ?? body.title;
     } catch {
-      if (asked === this.asked) problem = speak`The 3D view cannot be reached.`;
+      if (asked === this.asked) problem = speak`The 3D view is unavailable.`;
     }
     if (problem === null) return;
     this.#state("lost", problem);

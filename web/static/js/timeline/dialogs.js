@@ -9,7 +9,7 @@ export function askReason(stride, answer) {
   const dialog = document.getElementById("leave-out");
   const form = dialog.querySelector("form");
   const { why, words } = form.elements;
-  dialog.querySelector("[data-which]").textContent = speak`The ${translate(stride.side)} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s no longer counts in any number. Undo brings it back.`;
+  dialog.querySelector("[data-which]").textContent = speak`The ${translate(stride.side)} stride from ${seconds(stride.start_s)} to ${seconds(stride.end_s)} s will be excluded from all values. Undo restores it.`;
   form.reset();
   words.oninput = () => words.value && (why.value = "");
   form.onsubmit = (e) => {

@@ -10,8 +10,8 @@ const STEP_S = 0.01;
 const WAIT_MS = 900;
 
 function origin(event) {
-  if (event.source === "manual") return speak`, placed by hand`;
-  return event.confidence === null ? "" : speak`, found by ${Math.round(100 * event.confidence)} % of the detectors`;
+  if (event.source === "manual") return speak`, placed manually`;
+  return event.confidence === null ? "" : speak`, detected by ${Math.round(100 * event.confidence)} % of the detectors`;
 }
 
 export class EventHandles {

@@ -10,7 +10,7 @@ const stance = (s) => (s.tc_s === null ? "–" : fixed((100 * (s.tc_s - s.start_
 
 // The picked stride with its three events as fields, and whether it counts.
 export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveOut, onCount }) {
-  if (!stride) return [h("p", { class: "small mut" }, speak`No stride here. Pick one above, or press J.`)];
+  if (!stride) return [h("p", { class: "small mut" }, speak`No stride here. Select one above, or press J.`)];
   const rows = [
     ["ic", speak`Contact`, stride.start_s],
     ["tc", speak`Foot-off`, stride.tc_s],
@@ -18,18 +18,18 @@ export function strideBox(stride, { editable, review, onMove, onDelete, onLeaveO
   ].map(([kind, label, time]) => eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }));
   const facts = h("p", { class: "small mut num" }, speak`${seconds(stride.end_s - stride.start_s)} s, stance ${stance(stride)} %`);
   const said = stride.used
-    ? stride.flags.length ? speak`Counts, although a rule says: ${stride.flags.map((flag) => translate(flag.replaceAll("_", " "))).join(", ")}.` : ""
-    : stride.excluded_by === "person" ? speak`Left out by hand: ${stride.excluded}.` : speak`Left out by rule: ${whyOut(stride)}.`;
+    ? stride.flags.length ? speak`Included, although a rule excludes it: ${stride.flags.map((flag) => translate(flag.replaceAll("_", " "))).join(", ")}.` : ""
+    : stride.excluded_by === "person" ? speak`Excluded manually: ${stride.excluded}.` : speak`Excluded by rule: ${whyOut(stride)}.`;
   const act = stride.used
     ? askWhyOut((reason) => onLeaveOut(stride, reason))
-    : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, speak`Count it`);
+    : h("button", { class: "btn", type: "button", "data-count": true, onclick: () => onCount(stride) }, speak`Include it`);
   return [facts, said ? h("p", { class: "small" }, said) : null, h("div", { class: "tl-fields" }, ...rows.flat()), editable ? act : null].filter(Boolean);
 }
 
 // One tap says why and leaves the stride out; words of one's own are asked for.
 function askWhyOut(answer) {
   const button = (words, reason, marks = {}) => h("button", { class: "btn", type: "button", ...marks, onclick: () => answer(reason) }, words);
-  return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, speak`Leave it out, because`), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button(speak`Other…`, "", { "data-out": true }));
+  return h("fieldset", { class: "tl-why" }, h("legend", { class: "small mut" }, speak`Exclude it because`), ...reasons().map((reason) => button(reason, reason, { "data-why": reason })), button(speak`Other…`, "", { "data-out": true }));
 }
 
 function eventRow(stride, kind, label, time, { editable, review, onMove, onDelete }) {
@@ -70,7 +70,7 @@ export function strideRows(review, win, picked, onPick) {
 
 // Changes that count, the newest first.
 export function editRows(review) {
-  if (!review.edits.length) return [h("li", { class: "mut" }, speak`None. Everything is as it was detected.`)];
+  if (!review.edits.length) return [h("li", { class: "mut" }, speak`None. All events are as detected.`)];
   return review.edits.toReversed().map((e) => {
     const day = new Date(e.at).toLocaleString(document.documentElement.lang === "de" ? "de-DE" : "en-GB", { day: "numeric", month: "short", hour: "2-digit", minute: "2-digit" });
     return h("li", {}, chip(e.side), h("span", {}, what(e, review), h("span", { class: "xs dim block" }, `${e.by ?? speak`unknown`}, ${day}`)));
@@ -84,6 +84,6 @@ function what(e, review) {
   if (e.kind === "move_event") return speak`${WORD[e.event]} moved from ${at} to ${seconds(e.to_s, 2)} s`;
   if (e.kind === "add_event") return speak`${WORD[e.event]} added at ${at}`;
   if (e.kind === "delete_event") return speak`${WORD[e.event]} at ${at} deleted`;
-  if (e.kind === "exclude_stride") return speak`stride at ${at} left out: ${e.reason}`;
-  return speak`stride at ${at} counted`;
+  if (e.kind === "exclude_stride") return speak`stride at ${at} excluded: ${e.reason}`;
+  return speak`stride at ${at} included`;
 }

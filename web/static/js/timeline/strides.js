@@ -42,7 +42,7 @@ function block(stride, index, top, height) {
   const [y, tall] = [top + height * 0.08, height * 0.84];
   const [start, end] = [stride.start_s * MS, stride.end_s * MS];
   const off = stride.tc_s === null ? end : stride.tc_s * MS;
-  const why = stride.used ? "" : speak`, left out: ${whyOut(stride)}`;
+  const why = stride.used ? "" : speak`, excluded: ${whyOut(stride)}`;
   return s(
     "g",
     { "data-stride": index },

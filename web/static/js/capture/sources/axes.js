@@ -46,7 +46,7 @@ export class AxesTest {
   // One sample: t in s, acc with gravity in m/s², rate [alpha, beta, gamma] as the browser gives it. True when something changed.
   push(t, acc, rate) {
     if (!this.pose || this.problem) return false;
-    if (![...acc, ...rate].every(Number.isFinite)) return this.fail(speak`This device gives no rate of turn, so it cannot be a sensor.`);
+    if (![...acc, ...rate].every(Number.isFinite)) return this.fail(speak`This device provides no angular rate, so it cannot be used as a sensor.`);
     this.rows.push({ t, acc, rate });
     let from = this.rows.length - 1;
     while (from > 0 && t - this.rows[from - 1].t <= STILL_S) from--;
@@ -55,7 +55,7 @@ export class AxesTest {
     const middle = mean(late, "acc"), norm = length(middle);
     if (late.some((row) => length(row.acc.map((v, i) => v - middle[i])) > STILL_SPREAD)) return false;
     if (Math.abs(norm - GRAVITY) > OFF) {
-      return this.fail(speak`Lying still it measures ${fixed(norm, 1)} m/s², not 9.8; its acceleration has no gravity in it.`);
+      return this.fail(speak`At rest it measures ${fixed(norm, 1)} m/s² instead of 9.8; its acceleration excludes gravity.`);
     }
     if (Math.abs(middle[this.pose.axis]) < ALONG * norm) return false;
     this.still.push({ from, to: this.rows.length - 1, acc: middle, rate: mean(late, "rate") });
@@ -71,7 +71,7 @@ export class AxesTest {
   decide() {
     const signs = this.still.map(({ acc }, i) => Math.sign(acc[POSES[i].axis]));
     if (signs.some((s) => s !== signs[0])) {
-      return this.fail(speak`One edge was the wrong way round: expected the left long edge down, then the top edge up.`);
+      return this.fail(speak`One edge was reversed: expected the left long edge down, then the top edge up.`);
     }
     const rest = mean(this.still, "rate"); // what the rates show in rest is their offset
     const found = [...readings()].map((reading) => ({ ...reading, error: this.misfit(reading, rest) }));
@@ -79,7 +79,7 @@ export class AxesTest {
     const [best, next] = found;
     if (best.error > FITS_DEG || next.error < OTHERS_DEG) {
       const off = best.error <= 180 ? speak` (${Math.round(best.error)}° off)` : "";
-      return this.fail(speak`The turns do not fit gravity${off}. Turn the device straight from one way to the next, without haste.`);
+      return this.fail(speak`The rotations do not match gravity${off}. Turn the device directly from one position to the next, without hurrying.`);
     }
     this.result = { accSign: signs[0], order: best.order, signs: best.signs, scale: best.scale, errorDeg: best.error };
     return true;

@@ -8,8 +8,8 @@ const SILENT_S = 1, MUTE_S = 5;
 const ID_KEY = "sagittal.capture.device", AXES_KEY = "sagittal.capture.axes";
 
 export function whyNot() {
-  if (!isSecureContext) return speak`The device's own sensor needs https. Open this page by the server's https address.`;
-  if (!("DeviceMotionEvent" in window)) return speak`This browser does not give its motion sensor to pages.`;
+  if (!isSecureContext) return speak`The built-in sensor requires https. Open this page at the server's https address.`;
+  if (!("DeviceMotionEvent" in window)) return speak`This browser does not allow pages to use the motion sensor.`;
   return null;
 }
 
@@ -35,7 +35,7 @@ export class DeviceMotion {
   async add() {
     const motion = /** @type {any} */ (DeviceMotionEvent); // only iOS has to be asked
     if (motion.requestPermission && (await motion.requestPermission()) !== "granted") {
-      throw new Error(speak`Motion was not allowed. Reload this page and allow it, or allow it in the browser's settings.`);
+      throw new Error(speak`Motion sensor access was denied. Reload this page and allow it, or allow it in the browser's settings.`);
     }
     let id = remembered(ID_KEY);
     if (!id) remember(ID_KEY, (id = `device-${crypto.getRandomValues(new Uint32Array(1))[0].toString(16).padStart(8, "0")}`));
@@ -134,8 +134,8 @@ export class DeviceMotion {
     const silent = sensor.meter.silentS();
     const rateHz = sensor.meter.rateHz();
     if (silent === null || silent > SILENT_S) return { kind: "bad", text: speak`No data`, rateHz: 0, note: speak`this device sends no motion` };
-    if (!this.axes) return { kind: "warn", text: speak`Check`, rateHz, note: speak`its axes are not checked yet` };
-    if (rateHz < 40) return { kind: "bad", text: speak`Too slow`, rateHz, note: speak`40 Hz are needed` };
+    if (!this.axes) return { kind: "warn", text: speak`Check`, rateHz, note: speak`axes not checked yet` };
+    if (rateHz < 40) return { kind: "bad", text: speak`Too slow`, rateHz, note: speak`at least 40 Hz required` };
     return { kind: "ok", text: speak`Ready`, rateHz };
   }
 }

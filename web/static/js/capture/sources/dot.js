@@ -14,7 +14,7 @@ const ACC_RANGE = 16 * 9.80665, GYR_RANGE = 2000 * (Math.PI / 180); // ±16 g an
 // Why there is no Bluetooth here, in a sentence for people; null where there is.
 export function whyNot() {
   if (navigator.bluetooth) return null;
-  if (!isSecureContext) return speak`Bluetooth needs https. Open this page by the server's https address.`;
+  if (!isSecureContext) return speak`Bluetooth requires https. Open this page at the server's https address.`;
   return speak`This browser cannot reach Bluetooth sensors. Use Chrome or Edge on Android, Windows, macOS or ChromeOS;`
     + speak` on an iPad use a browser with Web Bluetooth, such as Bluefy.`;
 }
@@ -43,7 +43,7 @@ export class Dot {
       });
     } catch (error) {
       if (error.name === "NotFoundError") return; // the person closed the list
-      throw new Error(speak`Bluetooth did not answer (${error.message}). Switch Bluetooth on and allow it for this page.`);
+      throw new Error(speak`Bluetooth did not respond (${error.message}). Turn on Bluetooth and allow it for this page.`);
     }
     if (this.sensors.some((s) => s.device === device)) return;
     const sensor = {
@@ -56,7 +56,7 @@ export class Dot {
     } catch (error) {
       sensor.gone = true;
       device.gatt.disconnect();
-      throw new Error(speak`${device.name} did not answer (${error.message}). Hold it close, wake it by moving it, and try again.`);
+      throw new Error(speak`${device.name} did not respond (${error.message}). Hold it close, move it to wake it, and try again.`);
     }
     this.sensors.push(sensor);
     this.onchange();

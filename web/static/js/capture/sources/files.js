@@ -36,12 +36,12 @@ export async function readFiles(files) {
     else if (text.trimStart().startsWith("{")) Object.assign(segments, mappingOf(text, file.name));
     else {
       throw new Error(speak`${file.name} is neither Xsens MT Manager text, a Sagittal live log nor a table with time and sensor`
-        + speak` columns. Choose such files; others can be uploaded on the session's page.`);
+        + speak` columns. Choose such files; others can be uploaded on the visit page.`);
     }
   }
   const { unique, copies } = withoutCopies(texts);
   if (unique.length) tracks.push(counterTrack(unique));
-  if (!tracks.length) throw new Error(speak`There is no recording among these files. Choose the sensors' files.`);
+  if (!tracks.length) throw new Error(speak`None of these files is a recording. Choose the sensor files.`);
   return { tracks, segments, copies };
 }
 
@@ -50,7 +50,7 @@ function mappingOf(text, name) {
   try {
     return JSON.parse(text).sensors ?? {};
   } catch {
-    throw new Error(speak`${name} is not readable JSON. Leave it out or choose it again.`);
+    throw new Error(speak`${name} is not valid JSON. Omit it or choose it again.`);
   }
 }
 
@@ -59,7 +59,7 @@ function withoutCopies(texts) {
   const unique = [], copies = [];
   for (const one of texts) {
     if (unique.some((u) => u.id === one.id)) {
-      throw new Error(speak`Sensor ${one.id} comes in two files (${one.name}). Choose the files of one walk, each sensor once.`);
+      throw new Error(speak`Sensor ${one.id} is in two files (${one.name}). Choose the files of a single walk, with each sensor once.`);
     }
     const same = (u) => u.values.length === one.values.length && u.values.every((v, i) => Object.is(v, one.values[i]));
     const twin = unique.find(same);
@@ -102,7 +102,7 @@ function counterTrack(texts) {
 
 function logTracks(bytes, name, segments) {
   const records = scanLog(bytes);
-  if (records[0]?.kind !== "H") throw new Error(speak`${name} is a live log without its first record; it cannot be played.`);
+  if (records[0]?.kind !== "H") throw new Error(speak`${name} is a live log without its first record and cannot be played back.`);
   const hello = JSON.parse(new TextDecoder().decode(records[0].body));
   const batches = records.filter((r) => r.kind === "B").map((r) => decodeBatch(r.body));
   return hello.streams.map((stream) => {

@@ -37,9 +37,9 @@ export function parseMtText(text, name) {
   const columns = columnsOf(names, lines[0], separator, name);
   if (columns[0][0] === undefined) {
     const what = names.includes("FreeAcc_X") ? speak`acceleration with gravity` : speak`acceleration`;
-    throw new Error(speak`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Export it again with it.`);
+    throw new Error(speak`${name} has no ${what} (Acc_X, Acc_Y, Acc_Z). Include it in the export.`);
   }
-  if (columns[1][0] === undefined) throw new Error(speak`${name} has no rate of turn (Gyr_X, Gyr_Y, Gyr_Z). Export it again with it.`);
+  if (columns[1][0] === undefined) throw new Error(speak`${name} has no angular rate (Gyr_X, Gyr_Y, Gyr_Z). Include it in the export.`);
   const wanted = columns.flat();
   const number = separator !== "," && !lines[0].includes(".") && /\d,\d/.test(lines[0]) ? (c) => value(c?.replace(",", ".")) : value;
   const counter = [], fine = [];
@@ -68,7 +68,7 @@ function columnsOf(names, first, separator, name) {
   if (separator === " " && found < names.length) {
     shift = names.length - found;
     if (names[0] !== "PacketCounter" || !names.slice(1, 1 + shift).every((n) => BLANK_IN_EXPORT.test(n))) {
-      throw new Error(speak`${name} is separated by spaces and has lost columns. Export it again with tab or comma.`);
+      throw new Error(speak`${name} is separated by spaces and columns are missing. Export it again with tabs or commas.`);
     }
   }
   const place = (n) => {

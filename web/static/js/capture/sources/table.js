@@ -29,9 +29,9 @@ export function parseTable(text, name) {
   const lines = text.slice(at).split(/\r?\n/).filter((line) => line.trim());
   const rows = lines.map((line) => line.split(separator).map((c) => (c.trim() ? Number(c) : NaN)));
   const backwards = rows.findIndex((row, i) => !(i ? row[time] > rows[i - 1][time] : row[time] >= 0));
-  if (rows.length < 2) throw new Error(speak`${name} has no samples. Choose another one.`);
+  if (rows.length < 2) throw new Error(speak`${name} has no samples. Choose another file.`);
   if (backwards >= 0) {
-    throw new Error(speak`${name}: t_s does not grow in row ${backwards + 2}. Times are in seconds, each later than the one before.`);
+    throw new Error(speak`${name}: t_s does not increase in row ${backwards + 2}. Times must be in seconds and strictly increasing.`);
   }
   const tUs = Float64Array.from(rows, (row) => Math.round(row[time] * 1e6));
   const steps = Array.from(tUs.subarray(1), (t, i) => t - tUs[i]).sort((a, b) => a - b);

@@ -1,0 +1,1 @@
+"""Tables of text: their shape, the names of their columns, units of time, workbooks."""
