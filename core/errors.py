@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from sagittal.core.message import describe_message, read_message
 
@@ -121,3 +121,39 @@ class Notice:
             stored["t_s"],
             stored.get("severity", "warning"),
         )
+
+
+TITLES: Final[Mapping[str, str]] = {
+    "angles_withheld": "Angles not reported",
+    "distances_withheld": "Distances not reported",
+    "facing_not_walking": "Facing direction differs from walking direction",
+    "figure_incomplete": "Avatar incomplete",
+    "filters_left_out": "Filters excluded",
+    "led_by_other": "Contacts from other detectors",
+    "live_figure_lost": "Live avatar lost",
+    "mounting_agreed": "Placement assumed",
+    "mounting_not_as_agreed": "Placement differs from the protocol",
+    "no_figure": "No avatar",
+    "no_live_figure": "No live avatar",
+    "no_open_take": "No open recording",
+    "no_rest": "No still period",
+    "no_standing": "No quiet standing",
+    "others_found_contacts": "More contacts from other detectors",
+    "same_session": "Same visit",
+    "sensors_exchanged": "Sensors swapped",
+    "session_planned": "Visit already planned",
+    "setup_wrong": "Set-up wrong",
+    "take_empty": "Recording empty",
+    "take_known": "Recording already known",
+    "take_open": "Recording in progress",
+}
+"""Titles of codes whose own words are not those of the field."""
+
+
+def title_of_code(code: str) -> str:
+    """Title of a notice or an error, from its code.
+
+    >>> title_of_code("clock_drifts"), title_of_code("no_rest")
+    ('Clock drifts', 'No still period')
+    """
+    return TITLES.get(code, code.replace("_", " ").capitalize())

@@ -123,7 +123,7 @@ def parse_template(template: str) -> tuple[str, Mapping[str, str]]:
 
 @lru_cache(maxsize=4096)
 def find_verbatim(identifier: str) -> frozenset[str]:
-    """Placeholders of a message that hold user text: those in quotation marks, and `IDENTIFIERS`.
+    """Placeholders of a message that contain user text: those in quotation marks, and `IDENTIFIERS`.
 
     >>> sorted(find_verbatim("Sensor {device}: {value} Hz in '{name}' and “{title}”."))
     ['device', 'name', 'title']

@@ -21,7 +21,7 @@ class UserText(str):
     __slots__ = ()
 
     def __html__(self) -> str:
-        """Escape the text; templates that join it with their own words leave the result as it is."""
+        """Escape the text; the result is plain markup, which templates can join with their own text."""
         return escape(str(self)).replace("&quot;", "&#34;").replace("&#x27;", "&#39;")
 
     def __radd__(self, prefix: str) -> UserText:

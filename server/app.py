@@ -24,7 +24,7 @@ def create_app(settings: Settings) -> FastAPI:
     UnknownViserError
         the installed viser is incompatible with the 3D views.
     """
-    # the web stack and its routes take seconds to import: only who builds an application waits for them
+    # the web stack and its routes take seconds to import, so they are imported only here
     from fastapi import FastAPI
     from starlette.middleware import Middleware
 
@@ -49,7 +49,7 @@ def create_app(settings: Settings) -> FastAPI:
         title="Sagittal",
         summary="Gait analysis from body-worn IMUs; research software, not a medical device.",
         version=CODE_VERSION,
-        # the interactive pages load scripts from elsewhere; the document itself is served by the API
+        # the interactive pages load external scripts; the document itself is served by the API
         openapi_url=None,
         docs_url=None,
         redoc_url=None,

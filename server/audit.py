@@ -23,7 +23,7 @@ from sagittal.server.storage.db import highest_number
 from sagittal.server.storage.schema.tables import audit, now
 
 GENESIS = "0" * 64
-"""What the first row follows."""
+"""Previous hash of the first row."""
 
 
 class Actor(Protocol):
@@ -49,7 +49,7 @@ def record(
     time: dt.datetime | None = None,
 ) -> None:
     """Append one row on a writing connection; actor None = the system, at None = now."""
-    token = getattr(actor, "token_id", None)  # who asks by an API token (server/auth/identity.py)
+    token = getattr(actor, "token_id", None)  # user of an API token (server/auth/identity.py)
     last = c.execute(select(audit.c.seq, audit.c.hash).order_by(audit.c.seq.desc()).limit(1)).first()
     row = {
         "seq": 1 if last is None else last.seq + 1,

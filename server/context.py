@@ -54,7 +54,7 @@ class State(datastructures.State):
     hub: Hub
     readiness: Readiness
     workers: Workers
-    """Only where `sagittal serve` started them."""
+    """Only if `sagittal serve` started them."""
 
 
 def state_of(connection: HTTPConnection) -> State:
@@ -84,7 +84,7 @@ OpenLogins = Annotated[Logins, _part(lambda state: state.logins)]
 Failures = Annotated[Throttle, _part(lambda state: state.throttle)]
 
 HEX_ID = r"^[0-9a-f]{32}$"
-"""How an identifier looks."""
+"""Format of an identifier."""
 Id = Annotated[str, Path(pattern=HEX_ID, description="32 hex digits")]
 DeviceId = Annotated[str, Path(pattern=r"^[0-9A-Za-z:-]{2,32}$", description="serial number of a sensor")]
 
@@ -100,14 +100,14 @@ async def _study_choice(
     ] = None,
     ticked: Annotated[bool, Query(description="only the visits that are named, even if none is")] = False,
 ) -> StudyChoice:
-    # a form sends what was left open as empty
+    # forms submit empty strings for fields left blank
     return StudyChoice(
         q, protocol or None, since or None, until or None, frozenset(visit or ()) if visit or ticked else None
     )
 
 
 StudyVisits = Annotated[StudyChoice, Depends(_study_choice)]
-"""The visits of a study, as its form and its address say them."""
+"""The visits of a study, from its form or URL."""
 
 
 def address_of(connection: HTTPConnection) -> str:

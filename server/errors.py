@@ -7,6 +7,7 @@ set_too_large, too_many_files · 422 bad_value · 503 node_away, blob_damaged, b
 from __future__ import annotations
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.message import Message
 
 
 class ServiceError(SagittalError):
@@ -21,7 +22,10 @@ class NotFound(ServiceError):  # noqa: N818 - the name of the HTTP status
     status = 404
 
     def __init__(self, kind: str, identity: str) -> None:
-        super().__init__("not_found", f"There is no {kind} '{identity}', or it has been deleted.")
+        super().__init__(
+            "not_found",
+            Message("There is no {kind} '{identity}', or it has been deleted.", kind=kind, identity=identity),
+        )
 
 
 class NotAllowed(ServiceError):  # noqa: N818 - the name of the HTTP status
@@ -37,7 +41,7 @@ class Conflict(ServiceError):  # noqa: N818 - the name of the HTTP status
 
 
 NODE_AWAY = "node_away"
-"""Also the problem of a take whose web server is away, or was when the take was ended."""
+"""Also the problem code of a trial whose web server is or was unavailable."""
 
 
 class NodeAway(ServiceError):  # noqa: N818 - what the person reads
@@ -48,7 +52,10 @@ class NodeAway(ServiceError):  # noqa: N818 - what the person reads
     def __init__(self, name: str | None) -> None:
         super().__init__(
             NODE_AWAY,
-            f"This live recording runs on server '{name}', which is unavailable. Try again in a moment.",
+            Message(
+                "This live recording runs on server '{name}', which is unavailable. Try again in a moment.",
+                name=name,
+            ),
         )
 
 

@@ -47,7 +47,7 @@ def _look_after(db: Database, blobs: BlobStore, settings: Settings) -> None:
     with db.read() as c:
         doubted = custody.find_doubt(c, settings)
         orphaned = report_links.list_orphaned(c)
-    if orphaned:  # made by accounts that had left before links ended with them
+    if orphaned:  # created by accounts closed before links ended with them
         with db.write() as c:
             report_links.end_orphaned(c, None)
     if doubted is not None:

@@ -15,7 +15,7 @@ from typing import Final
 from sagittal.server.settings import Settings
 
 request_id: ContextVar[str | None] = ContextVar("request_id", default=None)
-"""Id of the request that is being served, None outside of one."""
+"""Id of the current request, None outside a request."""
 
 _STANDARD: Final = frozenset(vars(logging.makeLogRecord({}))) | {"message", "asctime", "request_id"}
 
@@ -28,7 +28,7 @@ def start_log(settings: Settings, handler: logging.Handler | None = None) -> Non
     logging.basicConfig(level=logging.INFO, handlers=[handler])
     for library in ("alembic", "procrastinate", "weasyprint", "fontTools"):
         logging.getLogger(library).setLevel(logging.WARNING)
-    # it warns of every attempt; that there is no line to PostgreSQL is said once, by who needs it
+    # it warns at every attempt; a missing connection to PostgreSQL is reported once by the code that needs it
     logging.getLogger("psycopg.pool").setLevel(logging.ERROR)
 
 

@@ -42,7 +42,7 @@ COMMANDS: Final = {
     "warm": "Compile the filters now, so that the first analysis does not wait for it.",
     "user": "Add a user, or give one a new password, on the command line.",
 }
-"""Command → what it does, as `sagittal --help` says without loading it."""
+"""Command → description for `sagittal --help`, without importing it."""
 
 SCIENCE: Final = frozenset({"bench", "sensitivity", "simulate", "stairs", "study", "tune"})
 """Commands whose module is in server/commands/science."""
@@ -80,7 +80,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except OSError as error:
         if error.filename is None:
-            raise  # of no file: nothing that a person could put right by its name
+            raise  # without a file: cannot be fixed by its name
         sys.stderr.write(f"{error.filename}: {error.strerror}. Check the path, its rights and the disk.\n")
         return 1
     except SagittalError as error:

@@ -23,7 +23,7 @@ from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_ta
 from sagittal.server.storage.schema.tables import JOB_STATES, job, now, session
 
 BUCKETS_S: Final = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
-"""Page requests are held to 0.3 s."""
+"""The target for page requests is 0.3 s."""
 
 METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
 OTHER_METHOD: Final = "other"

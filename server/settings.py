@@ -122,7 +122,7 @@ class Settings:
         _require(self.log_format in {"text", "json"}, "log_format", f"'{self.log_format}'", "text or json")
         _require(not self.data_dir.is_file(), "data_dir", f"'{self.data_dir}', a file", "a folder")
         if self.database_url and not self.database_url.startswith("postgresql://"):
-            # what was given is not repeated: it may hold a password
+            # the value is not repeated, as it may contain a password
             raise SettingsError("database_url is no postgresql://user:password@host:port/database.")
         self._check_node()
         _require(_BUCKET.fullmatch(self.bucket) is not None, "bucket", f"'{self.bucket}'", BUCKET_DOMAIN)

@@ -30,15 +30,15 @@ from sagittal.server.storage.schema.tables import now
 log = logging.getLogger(__name__)
 
 QUIET_S: Final = 15 * 60.0
-"""What one sign-in watches is written down so often: of each resource and kind."""
+"""Minimum interval of audit rows for repeated access, per sign-in, resource and kind."""
 MOST_WAITING: Final = 10_000
-"""Rows kept in memory while the disk refuses, some 10 MB."""
+"""Rows in memory while the disk is not writable, some 10 MB."""
 MOST_REFUSED: Final = 100
-"""Rows an hour about people who could not get in: somebody who guesses for a year fills 400 MB at most."""
+"""Audit rows per hour about failed sign-ins: guessing for a year fills at most 400 MB."""
 _HOUR_S: Final = 3600.0
 _RETRY_S: Final = 30.0
 _AT_ONCE: Final = 500
-"""Rows of one transaction; others want to write too."""
+"""Rows per transaction, so that other writers get a turn."""
 _MOST_WATCHED: Final = 10_000
 
 
@@ -72,7 +72,7 @@ class AuditTrail:
         self._db = db
         self._clock = clock
         self._turn = threading.Lock()  # held while rows are written
-        self._guard = threading.Lock()  # held for moments
+        self._guard = threading.Lock()  # held briefly
         self._waiting: deque[_Row] = deque()
         self._watched: dict[tuple[str, str, str | None], float] = {}
         self._refused: deque[float] = deque()

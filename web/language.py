@@ -1,8 +1,8 @@
 """Languages of the pages: English in the sources, others as catalogues in web/texts.
 
 A message is an English text with `{placeholders}`; a `Message` of core holds it together with its values.
-Each is written as its type asks: a number by the locale, a word of the product by the catalogue, user text as
-it is. Sentences without a template go to `web/stored_sentences.py` (docs/how-to/languages.md).
+Values are formatted by type: numbers by locale, words of the product by the catalogue, user text unchanged.
+Sentences without a template are handled by `web/stored_sentences.py` (docs/how-to/languages.md).
 """
 
 from __future__ import annotations
@@ -33,15 +33,16 @@ SOURCE: Final = "en"
 TEXTS: Final = Path(__file__).parent / "texts"
 
 
-def _name_language(code: str) -> str:
+def name_language(code: str) -> str:
+    """Name of a language in the language itself."""
     name = Locale.parse(code).get_display_name() or code
     return name[0].upper() + name[1:]
 
 
 LANGUAGES: Final[Mapping[str, str]] = {
-    code: _name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
+    code: name_language(code) for code in (SOURCE, *sorted(path.stem for path in TEXTS.glob("*.po")))
 }
-"""Code of a language → its own name; the first is that of the sources, every catalogue is another."""
+"""Language code → its own name; the first is that of the sources, the others have catalogues."""
 
 
 def choose_language(accepted: str | None) -> str:
@@ -83,8 +84,13 @@ class Catalogue:
         return SentenceFinder({**earlier, **self.messages}, self._values)
 
     def find(self, text: str) -> str | None:
-        """A text in this language; None where no part of it is made from a message."""
-        said = self._render(text) if isinstance(text, Message) else self.messages.get(text)
+        """Translation of a text; None if the catalogue does not have it.
+
+        Only a sentence that carries no template is compared with the patterns of all messages.
+        """
+        if isinstance(text, Message):
+            return self._render(text)
+        said = self.messages.get(text)
         return self._sentences.find(text) if said is None else said
 
     def translate(self, text: str) -> str:
@@ -93,7 +99,7 @@ class Catalogue:
         return text if translation is None else translation
 
     def fill(self, message: str, values: Mapping[str, str]) -> str:
-        """The text of a message with values that are said already; English where the catalogue has none."""
+        """Translation of a message with translated values; English if the catalogue has none."""
         return fill_placeholders(self.messages.get(message, message), values)
 
     def day(self, value: dt.date | dt.datetime) -> str:
@@ -101,23 +107,23 @@ class Catalogue:
         return self._values.day(value)
 
     def _render(self, message: Message) -> str | None:
-        """The text of a template with its values; None where the catalogue does not have it."""
+        """Translation of a message with its values; None if the catalogue does not contain it."""
         identifier, formats = parse_template(message.template)
-        said = self.messages.get(identifier)
-        if said is None:
+        translation = self.messages.get(identifier)
+        if translation is None:
             if has_words(identifier):
                 return None
-            said = identifier
+            translation = identifier
         values = {name: self._write(message.values[name], spec) for name, spec in formats.items()}
-        return match_case(message, fill_placeholders(self._values.mark_quotations(said), values))
+        return match_case(message, fill_placeholders(self._values.mark_quotations(translation), values))
 
     def _write(self, value: Value, spec: str) -> str:
-        """A value as this language writes it."""
+        """Format a value in this language."""
         if isinstance(value, dt.date) and not spec:
             return self.day(value)
         if isinstance(value, str):
             return str(value) if isinstance(value, UserText) else self.translate(value)
-        return self._values.localise(format(value, spec))
+        return format(value, spec).replace(".", self._values.decimal_mark)
 
 
 def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
@@ -136,7 +142,7 @@ def read_earlier() -> Mapping[str, str]:
 
 
 def catalogue_path(language: str) -> Path:
-    """Where the texts of a language are."""
+    """Path of a language's catalogue."""
     return TEXTS / f"{language}.po"
 
 
@@ -171,7 +177,7 @@ SCRIPT_PLACES: Final = (
     "server/pages/words.py",
     "tests/helpers/texts.py",
 )
-"""Where the messages come from that scripts say, or are sent to say."""
+"""Sources of messages that are used in scripts."""
 
 
 @functools.cache

@@ -19,10 +19,10 @@ SPOKEN_KEYS: Final = frozenset(
         "title", "todo", "unit", "up", "why", "word", "words",
     }
 )  # fmt: skip
-"""Members of what a page hands to its scripts that are words for people."""
+"""Keys of page data for scripts whose values are user-visible text."""
 
 SPOKEN_MAPS: Final = frozenset({"segments"})
-"""The same, of which every member is."""
+"""Likewise for mappings, all of whose values are."""
 
 _FIGURE_TEXT: Final = re.compile(
     r"(<(?:text|title|tspan)\b[^>]*>)([^<]+)(?=<)|((?:aria-label|title)=\")([^\"]+)(?=\")"

@@ -75,7 +75,7 @@ class SentenceFinder:
         return None if said is None else self._unmask(said, quotations)
 
     def _mask(self, text: str) -> tuple[str, list[str]]:
-        """Put a sign for each quotation, which no message has and no number is part of."""
+        """Replace each quotation by a character that occurs in no message or number."""
         quotations: list[str] = []
 
         def mask(found: re.Match[str]) -> str:
@@ -96,7 +96,7 @@ class SentenceFinder:
         return said
 
     def _loosely(self, text: str) -> str | None:
-        """A sentence with words of somebody else in it, or sentences of which some are known."""
+        """Translate a sentence with foreign text in it, or several sentences of which some are known."""
         made = self._by_pattern(text, strong=True, loose=True) if len(text) <= LONGEST else None
         made = made or self._by_sentences(_SENTENCE.split(text), partly=True)
         return text if made is None and CITED.search(text) else made
@@ -130,14 +130,14 @@ class SentenceFinder:
         )
 
     def _before_stop(self, text: str) -> str | None:
-        """A message after which a page has set a full stop."""
+        """Translate a message followed by a full stop added by a page."""
         if text[-1] not in ".:;" or len(text) < 2:
             return None
         before = self._known(text[:-1])
         return None if before is None else before + text[-1]
 
     def _plain(self, text: str) -> str | None:
-        """A date, a number, or a name of capitals."""
+        """Format a date, a number, or a name in capitals."""
         date = self._values.find_date(text)
         if date is not None:
             return date
@@ -151,7 +151,7 @@ class SentenceFinder:
         return None
 
     def _measured(self, text: str) -> str | None:
-        """A number and its unit, or a word and its number."""
+        """Translate a number with its unit, or a word with its number."""
         numbered = _NUMBERED.fullmatch(text)
         if numbered and (word := self._known(numbered[1])) is not None:
             return word + self._values.localise(numbered[2])
@@ -164,7 +164,7 @@ class SentenceFinder:
         return None if unit is None else f"{self._values.localise(found[1])}{found[2]}{unit}"
 
     def _by_pattern(self, text: str, *, strong: bool, loose: bool = False) -> str | None:
-        """A sentence that was made from a message; `loose` = whatever stands in its placeholders."""
+        """Translate a sentence formatted from a message; `loose` = with any values of its placeholders."""
         for pattern in self._patterns:
             if pattern.is_strong != strong:
                 continue
@@ -175,7 +175,7 @@ class SentenceFinder:
         return None
 
     def _fill_pattern(self, pattern: _Pattern, values: Mapping[str, str]) -> str:
-        """The text of a message whose values are not said yet; numbers are localised, except in user text."""
+        """Fill a message with untranslated values; numbers are localised, except in user text."""
         said: dict[str, str] = {}
         settled: dict[str, str] = {}
         for n, (name, value) in enumerate(values.items()):
@@ -190,7 +190,7 @@ class SentenceFinder:
         return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
 
     def _stands_alone(self, value: str) -> bool:
-        """Whether a value is a word or a message by itself, not a piece of another sentence."""
+        """Whether a value is a single word or complete message rather than part of a sentence."""
         return (
             not re.search(r"\s", value.strip())
             or self._known(value) is not None
@@ -198,7 +198,7 @@ class SentenceFinder:
         )
 
     def _by_parts(self, text: str) -> str | None:
-        """A text of parts that are messages."""
+        """Translate a text composed of messages."""
         for join in _JOINS:
             if text.count(join) >= MOST_PARTS:
                 continue
@@ -233,7 +233,9 @@ class SentenceFinder:
         )
 
     def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
-        """Sentences one after another, those of one message together; `partly` = some may stay."""
+        """Translate consecutive sentences, jointly if they form one message; `partly` = allow unknown
+        ones.
+        """
         said: list[str] = []
         found = False
         while sentences and (len(sentences) > 1 or said):
@@ -255,7 +257,7 @@ class SentenceFinder:
 
 
 class _Pattern:
-    """How the sentences of one message look."""
+    """Pattern of the sentences formatted from one message."""
 
     def __init__(self, text: str, said: str) -> None:
         self.said = said
@@ -281,7 +283,7 @@ class _Pattern:
         self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
 
     def match(self, text: str) -> Iterator[dict[str, str]]:
-        """What may stand in the placeholders; nothing if the text is not made from this message."""
+        """Yield possible values of the placeholders; none if the text does not match."""
         if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
             return
         before: tuple[str, ...] = ()

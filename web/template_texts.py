@@ -115,7 +115,7 @@ def _is_markup(expression: str) -> bool:
 def _speak(text: str, function: str) -> str:
     run = _Run(text)
     if not any(has_words(piece) for piece in run.pieces[::2]):
-        # the white space of values alone stays as it is written
+        # white space of values alone is preserved
         return re.sub(
             r"\{\{(-?)(.*?)(-?)\}\}",
             lambda m: f"{{{{{m[1]} {function}({m[2].strip()}) {m[3]}}}}}",

@@ -109,4 +109,4 @@ FILTERS: dict[str, Callable[..., Any]] = {
     "said": as_it_is,
     "meant": lambda text, meaning: text,
 }
-"""By the name templates use."""
+"""By the name used in templates."""

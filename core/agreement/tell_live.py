@@ -16,7 +16,7 @@ AGAIN: Final = "sensors_agree_again"
 
 RESOLVED: Final = {
     "sensors_exchanged": "The sensors of {sensors} fit where they are worn now.",
-    "sensor_slipped": "The sensor on {sensors} sits as it did before it slipped.",
+    "sensor_slipped": "The sensor on {sensors} is back in its position from before the slip.",
 }
 """Code of a notice → what is said when it no longer holds."""
 
@@ -71,7 +71,7 @@ def tell_slip_now(slip: SensorSlip) -> Notice:
     )
 
 
-def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
+def take_back(notice: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
     """Notice that an earlier notice no longer holds."""
-    what = RESOLVED.get(told.code, CLOCK_AGREES)
-    return Notice(AGAIN, Message(what, sensors=list_sensors(sensors)), told.sensor, t_s, "info")
+    sentence = RESOLVED.get(notice.code, CLOCK_AGREES)
+    return Notice(AGAIN, Message(sentence, sensors=list_sensors(sensors)), notice.sensor, t_s, "info")

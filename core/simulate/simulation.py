@@ -55,6 +55,6 @@ def simulate(
     impacts = draw_impacts(motion, draws.impacts) if setup.impacts else ()
     tremors = motion.plan.tremors
     paths = {s: place_sensor(motion, s, m, setup.tissue, impacts, tremors) for s, m in mounts.items()}
-    made = record(paths, setup, draws, walker.height_m)
-    truth = truth_of(motion, every, mounts, made.errors, seed)
-    return Simulation(**vars(made), truth=truth)
+    recorded = record(paths, setup, draws, walker.height_m)
+    truth = truth_of(motion, every, mounts, recorded.errors, seed)
+    return Simulation(**vars(recorded), truth=truth)

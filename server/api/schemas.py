@@ -21,20 +21,20 @@ from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads.recordings import RecordedFile, RecordingState
 
 _HIDDEN = "\u00ad\u200b\u200e\u200f\u202a-\u202e\u2060-\u206f\ufeff"
-"""What is not seen or turns the text beside it round (Unicode, category Cf)."""
+"""Invisible characters and those that reverse the text direction (Unicode, category Cf)."""
 _JOINERS = "\u200c\u200d"
-"""Not seen either, but words of some scripts and emoji need them; a patient's code does not."""
+"""Also invisible, but required by some scripts and emoji; not allowed in a patient's code."""
 
 
 def _one_line(refused: str) -> str:
     """Pattern of a single line that starts and ends with a visible character, without control characters."""
-    # up to 9f, as U+0085 is a space here and none in JSON Schema
+    # up to 9f, as U+0085 is a space here but not in JSON Schema
     no = f"\\x00-\\x1f\\x7f-\\x9f{refused}"
     return f"^[^\\s{no}]([^{no}]*[^\\s{no}])?$"
 
 
 _NO_TEXT = f"\\x00-\\x08\\x0b\\x0c\\x0e-\\x1f\\x7f{_HIDDEN}"
-# text of many lines
+# multi-line text
 _TEXT = f"^[^{_NO_TEXT}]*$"
 Line = Annotated[str, StringConstraints(min_length=1, max_length=200, pattern=_one_line(_HIDDEN))]
 Code = Annotated[str, StringConstraints(min_length=1, max_length=64, pattern=_one_line(_HIDDEN + _JOINERS))]

@@ -18,6 +18,7 @@ from sqlalchemy import Connection, Row, delete, insert, select, update
 from sqlalchemy.exc import OperationalError
 from starlette.requests import HTTPConnection
 
+from sagittal.core.message import Message
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import Action, Role
 from sagittal.server.auth.sight import NOTHING, opens_parts
@@ -29,10 +30,10 @@ from sagittal.server.storage.schema.person_tables import api_token
 from sagittal.server.storage.schema.tables import new_id, now, user
 
 PREFIX: Final = "sgt_"
-"""By it a token is known where one has leaked."""
+"""Makes leaked tokens recognizable."""
 MOST_DAYS: Final = 365
 MOST_TOKENS: Final = 50
-"""Of one person."""
+"""Per user."""
 _TOUCH_EVERY: Final = dt.timedelta(minutes=10)
 _DOORS: Final = ("/api/v1/", "/metrics")
 
@@ -72,7 +73,7 @@ SCOPES: Final[Mapping[Scope, frozenset[Action]]] = {
     ),
     Scope.METRICS: frozenset({Action.READ_SYSTEM}),
 }
-"""What each scope allows; no scope deletes a patient or a visit, reads the audit log or touches accounts."""
+"""Actions allowed by each scope; none deletes a patient or visit, reads the audit log or changes accounts."""
 
 
 def issue(
@@ -85,7 +86,10 @@ def issue(
         raise Problem(
             409,
             "too_many_tokens",
-            f"An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+            Message(
+                "An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+                MOST_TOKENS=MOST_TOKENS,
+            ),
         )
     token, issued_at = PREFIX + new_token(), now()
     values = {

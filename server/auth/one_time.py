@@ -65,7 +65,7 @@ def is_valid(c: Connection, token: str, purpose: str) -> bool:
 def use(c: Connection, token: str, purpose: str) -> str | None:
     """Consume the token and return its user id (None for set-up); raise LinkNotValid if it is invalid."""
     row = _find(c, token, purpose)
-    # one answer for unknown, used and expired: nothing to learn by guessing
+    # the same response for unknown, used and expired links, so that guessing reveals nothing
     if row is None:
         raise LinkNotValid
     hashed = token_hash(token)

@@ -11,6 +11,7 @@ from pwdlib import PasswordHash
 from pwdlib.exceptions import PwdlibError
 from pwdlib.hashers.argon2 import Argon2Hasher
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 
 MIN_LENGTH = 12  # OWASP ASVS 4.0.3, 2.1.1
@@ -18,9 +19,9 @@ MAX_LENGTH = 128  # OWASP ASVS 4.0.3, 2.1.2
 
 # argon2id m=64 MiB, t=3, p=4 (RFC 9106 §4, second recommended option) are the hasher's defaults
 _HASHER = PasswordHash((Argon2Hasher(),))
-# each hash takes 64 MiB: without a bound a burst of sign-ins would take the machine's memory
+# each hash takes 64 MiB: unbounded, a burst of sign-ins would exhaust memory
 _SLOTS = threading.BoundedSemaphore(2)
-# and without an end to the waiting it would take every thread that answers requests
+# and with unlimited waiting it would occupy all threads that serve requests
 PATIENCE_S = 5.0
 
 
@@ -30,8 +31,13 @@ def hash_password(password: str) -> str:
         raise Problem(
             422,
             "weak_password",
-            f"A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {len(password)}. "
-            "A few unrelated words make a good one.",
+            Message(
+                "A password needs {MIN_LENGTH} to {MAX_LENGTH} characters; this one has {password}. "
+                "A few unrelated words make a good one.",
+                MIN_LENGTH=MIN_LENGTH,
+                MAX_LENGTH=MAX_LENGTH,
+                password=len(password),
+            ),
         )
     with _slot():
         return _HASHER.hash(password)

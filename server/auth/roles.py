@@ -11,7 +11,7 @@ class Role(StrEnum):
     ADMIN = "admin"
     CLINICIAN = "clinician"
     ASSISTANT = "assistant"
-    """Uploads recordings and sees what was found in them, not the results."""
+    """Uploads recordings and sees their inspection, but no results."""
     VIEWER = "viewer"
 
 
@@ -24,19 +24,19 @@ class Action(StrEnum):
     LOAD_ASSET = "load_asset"
     USE_ACCOUNT = "use_account"
     WATCH_SIGN_IN = "watch_sign_in"
-    """Asks how long the sign-in still lasts; the only action that does not prolong it."""
+    """Queries the remaining time of the sign-in; the only action that does not prolong it."""
     READ_API = "read_api"
     READ_PATIENT = "read_patient"
     WRITE_PATIENT = "write_patient"
     DELETE_PATIENT = "delete_patient"
     EXPORT_PATIENT = "export_patient"
-    """Takes everything that is stored of a patient along."""
+    """Exports all stored data of a patient."""
     EXPORT_STUDY = "export_study"
-    """Takes the numbers of many patients along, by pseudonyms."""
+    """Exports pseudonymized results of many patients."""
     OPEN_IN_EMERGENCY = "open_in_emergency"
-    """Opens a patient of another care team for a time, with a reason."""
+    """Opens a patient of another care team temporarily, with a reason."""
     READ_IDENTITY = "read_identity"
-    """Reads the name behind a pseudonym, date of birth and address, and prints them."""
+    """Reads and prints the patient's name, date of birth and address."""
     WRITE_IDENTITY = "write_identity"
     READ_SESSION = "read_session"
     CREATE_SESSION = "create_session"
@@ -46,25 +46,25 @@ class Action(StrEnum):
     ANALYSE = "analyse"
     READ_RESULT = "read_result"
     REVIEW = "review"
-    """Changes events and decides which strides count."""
+    """Edits events and excludes or includes strides."""
     SIGN_REPORT = "sign_report"
-    """Writes the therapist's text, signs, reopens, makes and revokes links."""
+    """Writes the assessment, signs, reopens, creates and revokes links."""
     READ_SHARED = "read_shared"
-    """Reads one signed report; the token in the address is the door."""
+    """Reads one signed report, authorized by the token in the URL."""
     RUN_LIVE = "run_live"
-    """Opens a live take, looks at it and gives feedback."""
+    """Opens a live trial, monitors it and gives feedback."""
     PAIR = "pair"
-    """Joins a tablet by the code on the therapist's screen; the code is the door."""
+    """Joins a tablet, authorized by the code on the therapist's screen."""
     STREAM = "stream"
-    """Sends the samples of one take; the take's token in the first message is the door."""
+    """Streams the samples of one trial, authorized by its token in the first message."""
     READ_JOB = "read_job"
     CANCEL_JOB = "cancel_job"
     READ_DEVICE = "read_device"
-    """Looks at the clinic's sensors; says nothing of who wore them."""
+    """Views the clinic's sensors, without patient data."""
     MANAGE_USERS = "manage_users"
     READ_AUDIT = "read_audit"
     READ_SYSTEM = "read_system"
-    """Looks at how the installation is, and reads its metrics."""
+    """Views the state of the installation and reads its metrics."""
 
 
 PUBLIC: frozenset[Action] = frozenset(
@@ -78,7 +78,7 @@ PUBLIC: frozenset[Action] = frozenset(
         Action.READ_SHARED,
     }
 )
-"""Actions that need no sign-in; all others do."""
+"""Actions allowed without a sign-in."""
 
 _ALL = frozenset(Role)
 _CLINICAL = frozenset({Role.ADMIN, Role.CLINICIAN})

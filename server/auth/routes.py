@@ -47,7 +47,8 @@ def list_declared_actions(routes: Sequence[BaseRoute]) -> dict[str, Action]:
 
 def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:
     """Yield every route with its full path."""
-    # newer FastAPI keeps an included router as one entry and has this walk; older ones copy its routes
+    # newer FastAPI keeps an included router as one entry and provides this iteration; older ones copy its
+    # routes
     contexts = getattr(fastapi.routing, "iter_route_contexts", None)
     if contexts is None:
         yield from ((getattr(route, "path", ""), route) for route in routes)
@@ -58,7 +59,7 @@ def _leaves(routes: Sequence[BaseRoute]) -> Iterator[tuple[str, BaseRoute]]:
 def _actions(route: BaseRoute) -> set[Action]:
     if isinstance(route, APIRoute | APIWebSocketRoute):
         return {d.call.action for d in _walk(route.dependant) if isinstance(d.call, RouteAccess)}
-    # a mounted application names its action itself
+    # a mounted application declares its action itself
     action = getattr(getattr(route, "app", None), "action", None)
     return {action} if isinstance(action, Action) else set()
 

@@ -30,11 +30,11 @@ log = logging.getLogger(__name__)
 
 STEP_S: Final = 30
 DRIFT: Final = 1
-"""Steps by which a telephone's clock may be off."""
+"""Tolerated clock offset of a phone, in time steps."""
 RECOVERY_CODES: Final = 10
 _ALPHABET: Final = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789"
 _GROUPS, _GROUP = 4, 4
-"""A recovery code has 80 random bits: its plain hash cannot be searched."""
+"""A recovery code has 80 random bits, so its plain hash cannot be brute-forced."""
 
 
 class CodeNeeded(Problem):
@@ -214,7 +214,7 @@ def _make_missing_key(c: Connection, path: Path) -> None:
         return
     if c.execute(select(second_factor.c.user_id).where(second_factor.c.confirmed_at.is_not(None))).first():
         raise KeyOfFactorsUnusable
-    c.execute(delete(second_factor))  # set up by the lost key and not proved: nobody can prove them
+    c.execute(delete(second_factor))  # registered with the lost key and unconfirmed: nobody can confirm them
     make_key(path)
 
 

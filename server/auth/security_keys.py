@@ -21,6 +21,7 @@ from typing import Any, Final, Literal
 from sqlalchemy import Connection, Row, delete, insert, select, update
 from starlette.requests import HTTPConnection
 
+from sagittal.core.message import Message
 from sagittal.server.auth import second_factor
 from sagittal.server.auth.tokens import token_hash
 from sagittal.server.http.hosts import host_name
@@ -32,9 +33,9 @@ log = logging.getLogger(__name__)
 
 CHALLENGE_LIFE: Final = dt.timedelta(minutes=5)
 MOST_KEYS: Final = 10
-"""Of one account."""
+"""Per account."""
 _MOST_WAITING: Final = 20
-"""Challenges of one account at a time; the oldest ends."""
+"""Pending challenges per account; the oldest is dropped."""
 _LONGEST_ADDRESS: Final = 255
 """Characters of `security_key.host`."""
 Purpose = Literal["register", "sign_in"]
@@ -113,7 +114,11 @@ def begin_registration(c: Connection, site: Site, user_id: str, name: str) -> di
         )
     keys = list_keys(c, user_id)
     if len(keys) >= MOST_KEYS:
-        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+        raise Problem(
+            409,
+            "too_many_keys",
+            Message("An account has at most {MOST_KEYS} keys. Remove one first.", MOST_KEYS=MOST_KEYS),
+        )
     options = generate_registration_options(
         rp_id=site.host,
         rp_name="Sagittal",
@@ -141,7 +146,7 @@ def take_challenge(c: Connection, user_id: str, purpose: Purpose, answer: Mappin
         table.c.purpose == purpose,
         table.c.expires_at > now(),
     )
-    # of two that come at once one deletes the row
+    # of two concurrent responses only one deletes the row
     return challenge if c.execute(delete(table).where(*expected)).rowcount else None
 
 
@@ -172,7 +177,11 @@ def register(
     if c.execute(same).first() is not None:
         raise KeyRefused(403)
     if len(list_keys(c, user_id)) >= MOST_KEYS:
-        raise Problem(409, "too_many_keys", f"An account has at most {MOST_KEYS} keys. Remove one first.")
+        raise Problem(
+            409,
+            "too_many_keys",
+            Message("An account has at most {MOST_KEYS} keys. Remove one first.", MOST_KEYS=MOST_KEYS),
+        )
     row = {
         "id": new_id(),
         "user_id": user_id,
@@ -199,7 +208,7 @@ def begin_sign_in(c: Connection, site: Site, user_id: str) -> dict[str, Any] | N
         rp_id=site.host,
         challenge=_new_challenge(c, user_id, "sign_in"),
         allow_credentials=[PublicKeyCredentialDescriptor(k.credential_id) for k in keys],
-        # the password is what one knows; the key is what one has
+        # the password is the knowledge factor; the key is the possession factor
         user_verification=UserVerificationRequirement.DISCOURAGED,
     )
     return _as_tree(options_to_json(options))

@@ -19,11 +19,11 @@ from sagittal.server.storage.refusal import is_busy, refusal_of
 from sagittal.server.storage.schema.tables import login_session, now, user
 
 TOUCH_EVERY = dt.timedelta(seconds=30)
-"""Activity is written at most this often: each write costs one fsync."""
+"""Minimum interval of writing activity: each write costs one fsync."""
 CHECK_EVERY_S: Final = 10.0
-"""How often an open websocket or event stream checks whether its sign-in still holds."""
+"""Interval at which an open websocket or event stream checks its sign-in."""
 MOST_KEPT: Final = 1000
-"""Sign-ins that live in memory because the disk refused them."""
+"""Sign-ins held in memory because the disk was not writable."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,11 +59,11 @@ class Logins:
         self._idle = idle
         self._absolute = absolute
         self._clock = clock
-        self._kept: dict[str, _Login] = {}  # opened while the disk refused
+        self._kept: dict[str, _Login] = {}  # opened while the disk was not writable
         self._seen: dict[
             str, dt.datetime
-        ] = {}  # activity that the disk refused, or that another write held up
-        self._ended: set[str] = set()  # ends that the disk refused
+        ] = {}  # activity not written because of a disk error or a concurrent write
+        self._ended: set[str] = set()  # sign-outs not written because of a disk error
 
     def start(self, c: Connection, user_id: str, replaces: str | None) -> str:
         """Open a sign-in and return its new token; the browser's previous token, if any, is revoked."""
@@ -130,7 +130,7 @@ class Logins:
         if session is None:
             return None
         login, identity = session
-        # a short idle time must not end between two writes
+        # a short idle time must not expire between two writes
         if login.last_seen_at <= time - min(TOUCH_EVERY, self._idle / 4):
             self._write_seen(login_id, time)
         return identity
@@ -205,7 +205,7 @@ class Logins:
                         .values(last_seen_at=time)
                     )
             except OperationalError as error:
-                # busy or refused: a page that only reads need not wait for this again
+                # busy or not writable: a read-only page need not wait for a retry
                 if refusal_of(error) is None and not is_busy(error):
                     raise
             else:

@@ -70,27 +70,29 @@ OWNER: Final[Mapping[str, _Owner]] = {
         planned_visit.c.id,
     ),
 }
-"""Part of an address that names something of a patient → whose it is, and the column that the part names."""
+"""Path parameter that refers to a patient's data → query of the owner, and the column matched by the
+parameter.
+"""
 
 OF_NOBODY: Final = frozenset(
     {
         "user_id",
         "token_id",
         "key_id",
-        "token",  # is itself the door
+        "token",  # contains its own authorization
         "device_id",
-        "view_id",  # its viewer asks of the session it shows (server/viewer/proxy.py)
-        "name",  # of a file or a value of what stands before it
+        "view_id",  # its viewer checks the session it shows (server/viewer/proxy.py)
+        "name",  # name of a file or value of the preceding resource
         "number",
         "language",
         "version",
     }
 )
-"""Parts of addresses that name nothing of a patient by themselves."""
+"""Path parameters that do not refer to a patient by themselves."""
 
 
 NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
-"""Parts of an address that names nothing."""
+"""Path parameters of a path without any."""
 
 
 def only_seen(query: Select[Any], user: Identity | None) -> Select[Any]:
@@ -167,4 +169,4 @@ def _is_seen(user_id: str | ColumnElement[str], patient_id: ColumnElement[str]) 
 
 
 TEAMS_ARE_ON: Final = exists().where(clinic_option.c.name == CARE_TEAMS)
-"""Whether the clinic has care teams, as a condition of a statement."""
+"""SQL condition: the clinic has care teams."""

@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 from sqlalchemy import ColumnElement, Connection, and_, delete, insert, select
 from sqlalchemy.exc import OperationalError
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem
 from sagittal.server.storage.db import Database
 from sagittal.server.storage.refusal import refusal_of
@@ -25,9 +26,9 @@ WINDOW_S = 15 * 60.0
 MAX_PER_PAIR = 10
 """Failures on one account from one address."""
 MAX_PER_ACCOUNT = 50
-"""From all addresses; higher, so that a stranger cannot lock a colleague out with ten wrong guesses."""
+"""From all addresses; higher, so that a stranger cannot lock out a user with ten wrong guesses."""
 MAX_PER_ADDRESS = 30
-"""On all accounts; a clinic may share one address. NIST SP 800-63B §5.2.2 allows 100 failures in a row."""
+"""On all accounts; a clinic may share one address. NIST SP 800-63B §5.2.2 allows 100 consecutive failures."""
 _MAX_KEYS = 10_000
 
 
@@ -87,7 +88,7 @@ class Throttle:
         Counting first keeps a burst of guesses from passing before the first of them has failed.
         """
 
-        # who is stopped already costs others no turn
+        # blocked attempts do not use up further attempts of others
         self.check(account, address)
 
         def do(times: FailureTimes) -> float:
@@ -130,7 +131,10 @@ class Throttle:
             raise Problem(
                 429,
                 "too_many_attempts",
-                f"Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                Message(
+                    "Too many failed attempts. Wait {minutes} min and try again, or ask an administrator.",
+                    minutes=minutes,
+                ),
                 headers={"Retry-After": str(seconds)},
             )
 

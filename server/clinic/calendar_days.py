@@ -5,12 +5,13 @@ from __future__ import annotations
 import datetime as dt
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.server.errors import ServiceError
 from sagittal.server.storage.schema.tables import now
 
 FIRST: Final = dt.date(1900, 1, 1)
 AHEAD: Final = dt.timedelta(days=3653)
-"""Nobody plans further ahead than ten years (our choice)."""
+"""Maximum of ten years ahead (our choice)."""
 
 
 def require_day(day: dt.date) -> dt.date:
@@ -19,7 +20,13 @@ def require_day(day: dt.date) -> dt.date:
     if FIRST <= day <= last:
         return day
     raise ServiceError(
-        "bad_value", f"The day is {day.isoformat()}. Expected one from {FIRST} to {last}; check the year."
+        "bad_value",
+        Message(
+            "The day is {isoformat}. Expected one from {FIRST} to {last}; check the year.",
+            isoformat=day.isoformat(),
+            FIRST=FIRST,
+            last=last,
+        ),
     )
 
 

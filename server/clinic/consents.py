@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.errors import Conflict, NotFound, ServiceError
@@ -58,12 +59,20 @@ def give(
     day = given_on or today
     if purpose not in CONSENT_PURPOSES:
         raise ServiceError(
-            "bad_value", f"'{purpose}' is not a valid purpose; expected {', '.join(CONSENT_PURPOSES)}."
+            "bad_value",
+            Message(
+                "'{purpose}' is not a valid purpose; expected {CONSENT_PURPOSES}.",
+                purpose=purpose,
+                CONSENT_PURPOSES=", ".join(CONSENT_PURPOSES),
+            ),
         )
     if not 1 <= len(evidence.strip()) <= 200:
         raise ServiceError("bad_value", "State in 1 to 200 characters where the consent is documented.")
     if not dt.date(1900, 1, 1) <= day <= today:
-        raise ServiceError("bad_value", f"The day is {day.isoformat()}. Expected today or an earlier day.")
+        raise ServiceError(
+            "bad_value",
+            Message("The day is {isoformat}. Expected today or an earlier day.", isoformat=day.isoformat()),
+        )
     if any(one.purpose == purpose and one.withdrawn_on is None for one in of_patient(c, patient_id)):
         raise Conflict("agreed_already", "This consent is already recorded and in force.")
     consent_id = new_id()

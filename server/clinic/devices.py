@@ -19,13 +19,13 @@ from sagittal.server.errors import NotFound
 from sagittal.server.storage.schema.tables import device_check, now, recording, session
 
 LISTED: Final = 200
-"""Devices of a list, and of what a tablet is told."""
+"""Devices in a list, and in the data sent to a tablet."""
 
 FOLLOWED: Final = 50
-"""Newest checks of a device that are shown and compared."""
+"""Latest checks of a device that are displayed and compared."""
 
 REMEMBERED_DAYS: Final = 365
-"""How long a place is offered again (our choice)."""
+"""How long a placement is suggested again (our choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class LastPlaces:
 
     segments: Mapping[str, str]
     day: dt.date | None
-    """Of the newest of these takes; None = nothing is known."""
+    """Date of the latest of these trials; None = unknown."""
 
 
 NO_PLACES: Final = LastPlaces({}, None)

@@ -17,6 +17,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, delete, insert, select, update
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.message import Message
 from sagittal.core.user_text import UserText
 from sagittal.server import audit
 from sagittal.server.clinic import patients
@@ -41,7 +42,7 @@ MOST: Final[Mapping[str, int]] = {
     "insurance_number": 64,
     "contact": 1000,
 }
-"""Characters at most."""
+"""Maximum number of characters."""
 OLDEST: Final = dt.date(1850, 1, 1)
 
 
@@ -116,9 +117,13 @@ def make_key(db: Database, key_file: Path) -> str:
         if not _is_there(key_file) and (sealing := _find_sealing(c)) is not None:
             raise KeyUnusable(
                 "identity_key_missing",
-                f"Names are encrypted by key {sealing}, which is not at {key_file}. Put the file with it "
-                "there, as the other web servers have it. If it is lost for good, see `sagittal identity-key "
-                "discard`.",
+                Message(
+                    "Names are encrypted by key {sealing}, which is not at {key_file}. Put the file "
+                    "with it there, as the other web servers have it. If it is lost for good, see "
+                    "`sagittal identity-key discard`.",
+                    sealing=sealing,
+                    key_file=key_file,
+                ),
             )
         name = make_keys(key_file)
         _set_sealing(c, name)
@@ -146,8 +151,12 @@ def discard_unreadable(db: Database, key_file: Path, *, really: bool, without_ke
             if really and not without_key:
                 raise KeyUnusable(
                     error.code,
-                    f"{error.message} Nothing was removed: with the right key at {key_file} all names may be "
-                    "readable. Only if it is lost for good, add --without-key.",
+                    Message(
+                        "{message} Nothing was removed: with the right key at {key_file} all names may be "
+                        "readable. Only if it is lost for good, add --without-key.",
+                        message=error.message,
+                        key_file=key_file,
+                    ),
                 ) from error
             keys = FieldKeys({})
             if really:
@@ -191,7 +200,7 @@ def change_key(db: Database, key_file: Path) -> tuple[str, int]:
         audit.record(c, None, "identities.key_changed", "database", None, {"patients": len(rows)})
     with db.write() as c:
         keys = _read_sealing(c, key_file)
-        _open_all(c, keys)  # the old one goes only when nothing needs it
+        _open_all(c, keys)  # the old key is removed only when it is no longer needed
         drop_other_keys(key_file, keys.name)
         return keys.name, len(rows)
 
@@ -247,8 +256,12 @@ def _read_keys(c: Connection, key_file: Path) -> FieldKeys:
     if sealing is not None and not keys.has(sealing):
         raise KeyUnusable(
             "identity_key_wrong",
-            f"Names are encrypted with key {sealing}, but the key file on this computer holds "
-            f"{keys.name}. The administrator must install the right file.",
+            Message(
+                "Names are encrypted with key {sealing}, but the key file on this computer holds {name}. The "
+                "administrator must install the right file.",
+                sealing=sealing,
+                name=keys.name,
+            ),
         )
     return keys
 
@@ -286,11 +299,14 @@ def _check(name: str, value: object) -> object:
     if name not in FIELDS:
         raise ServiceError("bad_value", "An identity has no such field.")
     if name == "born_on":
-        # a day to come may be today elsewhere on earth
+        # tomorrow may be today in another time zone
         if isinstance(value, dt.date) and not OLDEST <= value <= now().date() + dt.timedelta(days=1):
             raise ServiceError("bad_value", "The date of birth is expected from 1850 to today.")
         return value
     text = "" if value is None else str(value).strip()
     if len(text) > MOST[name] or "\0" in text:
-        raise ServiceError("bad_value", f"The {say_field(name)} has at most {MOST[name]} characters.")
+        raise ServiceError(
+            "bad_value",
+            Message("The {name} has at most {name2} characters.", name=say_field(name), name2=MOST[name]),
+        )
     return text or None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection, delete, insert, select
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients
 from sagittal.server.clinic.calendar_days import require_day
@@ -40,7 +41,10 @@ def add(
     patients.get(c, patient_id)
     text = content.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
-        raise ServiceError("bad_value", f"A note has 1 to {MOST_CHARACTERS:,} characters.")
+        raise ServiceError(
+            "bad_value",
+            Message("A note has 1 to {MOST_CHARACTERS:,} characters.", MOST_CHARACTERS=MOST_CHARACTERS),
+        )
     note_id = new_id()
     c.execute(
         insert(patient_note).values(
@@ -71,7 +75,8 @@ def remove(c: Connection, actor: audit.Actor | None, note_id: str, *, of_others:
     note = get(c, note_id)
     if not may_remove(note, actor, of_others=of_others):
         raise NotAllowed(
-            "not_yours", f"{note.by} wrote this note. Ask that person or an administrator to remove it."
+            "not_yours",
+            Message("{by} wrote this note. Ask that person or an administrator to remove it.", by=note.by),
         )
     c.execute(delete(patient_note).where(patient_note.c.id == note_id))
     audit.record(c, actor, "note.removed", "patient", note.patient_id, {"note_id": note_id})

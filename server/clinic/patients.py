@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Select, bindparam, func, insert, select, upda
 from sqlalchemy.exc import IntegrityError
 
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.sight import TEAMS_ARE_ON, only_seen
@@ -86,7 +87,10 @@ class CodeTaken(Conflict):
     """
 
     def __init__(self, code: str, patient_id: str | None) -> None:
-        super().__init__("code_taken", f"The code '{code}' belongs to another patient; choose a new one.")
+        super().__init__(
+            "code_taken",
+            Message("The code '{code}' belongs to another patient; choose a new one.", code=code),
+        )
         self.patient_id = patient_id
 
 
@@ -219,7 +223,7 @@ def _listing() -> Select[Any]:
         .correlate(patient)
         .scalar_subquery()
     )
-    # read once for all patients: asked for each, it would look through every job that waits each time
+    # one query for all patients: per patient, it would scan all queued jobs each time
     running = patient.c.id.in_(
         select(session.c.patient_id)
         .join(recording, recording.c.session_id == session.c.id)
@@ -240,7 +244,7 @@ def _one() -> Select[Any]:
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A patient has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", Message("A patient has no {join}.", join=", ".join(sorted(unknown))))
     checked = dict(values)
     if "code" in checked:
         code = normalize("NFKC", str(checked["code"])).strip()
@@ -249,7 +253,10 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
         checked["code"] = code
     born, year = checked.get("birth_year"), now().year
     if isinstance(born, int) and born > year:
-        raise ServiceError("bad_value", f"The year of birth is {born}. Expected {year} or earlier.")
+        raise ServiceError(
+            "bad_value",
+            Message("The year of birth is {born}. Expected {year} or earlier.", born=born, year=year),
+        )
     return checked
 
 

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from sqlalchemy import ColumnElement, Connection, delete, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.calendar_days import require_day
@@ -20,7 +21,7 @@ from sagittal.server.storage.schema.tables import new_id, now, planned_visit, pr
 VisitState = Literal["done", "missing", "next", "planned"]
 
 NEAR = dt.timedelta(days=4)
-"""A session this close to a planned day is probably that visit: half the distance of two weeks' visits."""
+"""A session this close to a planned date probably is that visit: half the interval of weekly visits."""
 
 
 @dataclass(frozen=True)
@@ -101,14 +102,24 @@ def start(
     """
     patients.get(c, patient_id)
     if template not in COURSES:
-        raise ServiceError("bad_value", f"The programme is one of {', '.join(COURSES)}, not '{template}'.")
+        raise ServiceError(
+            "bad_value",
+            Message(
+                "The programme is one of {COURSES}, not '{template}'.",
+                COURSES=", ".join(COURSES),
+                template=template,
+            ),
+        )
     course = COURSES[template]
     days = course.days(require_day(starts_on))
     for active in of_patient(c, patient_id):
         if min(days) <= active.ends_on and active.visits[0].planned_on <= max(days):
             raise Conflict(
                 "programme_running",
-                f"This patient has a programme until {active.ends_on}; end it first or start after that day.",
+                Message(
+                    "This patient has a programme until {ends_on}; end it first or start after that day.",
+                    ends_on=active.ends_on,
+                ),
             )
     programme_id = new_id()
     row = {"id": programme_id, "patient_id": patient_id, "template": template, "starts_on": starts_on}
@@ -220,10 +231,15 @@ def _check_session(c: Connection, row: Any, session_id: str) -> None:
     if sessions.get(c, session_id).patient_id != row.patient_id:
         raise Conflict("other_patient", "This visit belongs to another patient.")
     if row.session_id not in {None, session_id}:
-        raise Conflict("visit_taken", f"{row.label} already has a visit; unlink it first.")
+        raise Conflict(
+            "visit_taken", Message("{label} already has a visit; unlink it first.", label=row.label)
+        )
     linked = visit_of(c, session_id)
     if linked is not None and linked.id != row.id:
-        raise Conflict("session_planned", f"This visit is already {linked.label}; unlink it there first.")
+        raise Conflict(
+            "session_planned",
+            Message("This visit is already {label}; unlink it there first.", label=linked.label),
+        )
 
 
 _VISITS = select(planned_visit, session.c.performed_on).join(

@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, bindparam, case, exists, func, insert, select, update
 
 from sagittal.core.frames import PROTOCOLS, Protocol
+from sagittal.core.message import Message
 from sagittal.core.subject.condition import (
     CHOICES,
     Footwear,
@@ -38,7 +39,7 @@ from sagittal.server.storage.schema.tables import (
 )
 
 WALKS: Final = ("walk", "treadmill")
-"""Protocols whose speed is somebody's walking speed."""
+"""Protocols whose speed is a gait speed."""
 
 CHANGEABLE = frozenset({"title", "performed_on", "protocol", "height_m", *CHOICES, "feedback", "note"})
 
@@ -217,7 +218,7 @@ def list_walks(c: Connection, patient_ids: Collection[str]) -> dict[str, list[Wa
     conditions: dict[tuple[Any, ...], WalkingCondition] = {}
     for session_id, patient_id, performed_on, *walked in c.execute(query):
         condition_key = tuple(walked)
-        if condition_key not in conditions:  # a clinic has few
+        if condition_key not in conditions:  # a clinic has only a few
             conditions[condition_key] = WalkingCondition(
                 **dict(zip(("protocol", *CHOICES), condition_key, strict=True))
             )
@@ -241,7 +242,7 @@ _ACTIVE = (
     .where(job.c.state.in_(ACTIVE_STATES), job.c.kind.not_in(BESIDE))
     .correlate(None)
 )
-"""Read once for all sessions: asked for each, it would look through every job that waits each time."""
+"""One query for all sessions: per session, it would scan all queued jobs each time."""
 _STATE = case(
     (session.c.id.in_(_ACTIVE), "running"),
     (exists().where(analysis.c.recording_id == recording.c.id, _MINE).correlate(session), "done"),
@@ -249,7 +250,9 @@ _STATE = case(
     (exists().where(recording_file.c.recording_id == recording.c.id, _MINE).correlate(session), "uploaded"),
     else_="empty",
 )
-"""State of a session, in the statement that reads it: as many sessions as one likes cost no further one."""
+"""State of a session, as part of the statement that reads it, so that any number of sessions needs
+only one.
+"""
 
 _HAS_VIDEO = exists().where(session_video.c.session_id == session.c.id).correlate(session)
 
@@ -263,18 +266,27 @@ _OF_PATIENT = _QUERY.where(session.c.patient_id == bindparam("of_patient")).orde
 def _checked(values: Mapping[str, object]) -> dict[str, Any]:
     unknown = values.keys() - CHANGEABLE
     if unknown:
-        raise ServiceError("bad_value", f"A visit has no {', '.join(sorted(unknown))}.")
+        raise ServiceError("bad_value", Message("A visit has no {join}.", join=", ".join(sorted(unknown))))
     checked = dict(values)
     if "title" in checked and not 1 <= len(str(checked["title"])) <= 200:
         raise ServiceError("bad_value", "A visit's title has 1 to 200 characters.")
     if checked.get("protocol", PROTOCOLS[0]) not in PROTOCOLS:
-        raise ServiceError("bad_value", f"The protocol is one of {', '.join(PROTOCOLS)}.")
+        raise ServiceError(
+            "bad_value", Message("The protocol is one of {PROTOCOLS}.", PROTOCOLS=", ".join(PROTOCOLS))
+        )
     for name, words in CHOICES.items():
         if checked.get(name) is not None and checked[name] not in words:
-            raise ServiceError("bad_value", f"{name} is one of {', '.join(words)}, or null where not stated.")
+            raise ServiceError(
+                "bad_value",
+                Message(
+                    "{name} is one of {words}, or null where not stated.", name=name, words=", ".join(words)
+                ),
+            )
     if not isinstance(checked.get("feedback", False), bool):
         raise ServiceError("bad_value", "feedback is true or false.")
     height = checked.get("height_m")
     if height is not None and not (isinstance(height, int | float) and 0.5 <= height <= 2.5):
-        raise ServiceError("bad_value", f"Body height is {height}, expected 0.5 to 2.5 m.")
+        raise ServiceError(
+            "bad_value", Message("Body height is {height}, expected 0.5 to 2.5 m.", height=height)
+        )
     return checked

@@ -21,7 +21,7 @@ def accept(*, data_dir: DataDir = None) -> int:
         try:
             custody.refuse_strangers(settings)
         except custody.StrangersError:
-            pass  # a new beginning beside what another database knew
+            pass  # a new start, independent of an earlier database
         else:
             require_database(settings.database_source)
         upgrade(settings.database_source, backups=settings.backups)

@@ -47,7 +47,7 @@ def analyse(
 
     try:
         overrides = read_overrides(config, estimator)
-        out.mkdir(parents=True, exist_ok=True)  # before minutes of work
+        out.mkdir(parents=True, exist_ok=True)  # fail before minutes of work
         sources = list(list_source_files(paths))
         declared = read_named_file(manifest) if manifest else None
         with _ProgressBar() as bar:

@@ -47,9 +47,9 @@ def demo(*, port: Whole | None = None) -> int:
                 "allowed_hosts": (),
                 "node_name": "",
                 "node_address": "",
-                "database_url": "",  # nor may they come among its patients
+                "database_url": "",  # nor may they be added to its patients
                 "bucket": "",
-                "backup_dir": "",  # the clinic's own backups must not be pushed out by simulated ones
+                "backup_dir": "",  # simulated backups must not displace the clinic's own
             }
         )
         helpers: list[subprocess.Popen[bytes]] = []
@@ -66,7 +66,7 @@ def demo(*, port: Whole | None = None) -> int:
                 token = one_time.issue_sign_in(c, person.id)
             say(f"Open {address}/sign-in/{token}")
             say("(signs you in once; everything is simulated and is removed when you stop with Ctrl-C)")
-            # simulating takes seconds of computing: never in the web process
+            # simulating takes seconds of CPU time: never in the web process
             start("sagittal.server.demo.clinic")
             _report(settings.database_source)
             start("sagittal.server.demo.live", address)

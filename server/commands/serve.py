@@ -75,7 +75,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
 
     settings.require_private_traffic()
     start_log(settings)
-    # what SQLite and libraries make is for the server's user only, as what we make is
+    # files created by SQLite and libraries must be accessible to the server's user only, like our own
     os.umask(0o077)
     served = contextlib.ExitStack()
     try:
@@ -87,7 +87,7 @@ def run(settings: Settings, announce: Callable[[str], None]) -> int:
     except (StrangersError, MigrationError, SettingsError, SagittalError, OSError) as error:
         served.close()
         if isinstance(error, OSError) and error.filename is not None:
-            raise  # told with what to look at, as of every command
+            raise  # reported with the setting to check, as in every command
         sys.stderr.write(f"{error}\n")
         return 1
     workers, keeper = Workers(settings), BackupKeeper(settings)
@@ -132,18 +132,18 @@ def _take_folder(settings: Settings, served: contextlib.ExitStack) -> ListeningS
     holder = f"process {os.getpid()}"
     fs.make_folder(settings.data_dir)
     served.enter_context(fs.Lock(settings.lock, holder, shared=bool(settings.node_name)))
-    # before anything else is made in a folder that `sagittal restore` wants empty
+    # before creating anything in a folder that must be empty for `sagittal restore`
     refuse_half_restored(settings)
     if settings.node_name:
         fs.make_folder(settings.node_folder)
         served.enter_context(fs.Lock(settings.node_lock, holder))
     let_in = require_use(open_blobs(settings))
     refuse_strangers(settings)
-    read_revision(settings.database_source)  # says why PostgreSQL is not reached
+    read_revision(settings.database_source)  # explains why PostgreSQL cannot be reached
     if settings.node_name:
         with closing(Database(settings.database_source)) as db:
             refuse_wrong_clock(db, settings)
-    # last: who is refused changes nothing
+    # last, so that a rejected start changes nothing
     listener = served.enter_context(open_listener(settings.host, settings.port))
     if let_in:
         note_bucket(settings)
@@ -158,8 +158,8 @@ def _take_folder(settings: Settings, served: contextlib.ExitStack) -> ListeningS
 
 
 def _ignore_stop_signals() -> None:
-    # uvicorn stops gracefully and then raises the signal again: without a handler that would end us here,
-    # before the workers have given their jobs back
+    # uvicorn stops gracefully and then raises the signal again: without a handler that would end the process
+    # before the workers have released their jobs
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, lambda *_: None)
 

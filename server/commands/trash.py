@@ -25,11 +25,11 @@ def trash(*, restore: bool = False, data_dir: DataDir = None) -> int:
     settings = load_settings({"data_dir": data_dir})
     if not restore:
         try:
-            if not (settings.bucket or settings.blobs.is_dir()):  # opening would make the folder
+            if not (settings.bucket or settings.blobs.is_dir()):  # opening would create the folder
                 require_database(settings.database_source)
             discarded = open_blobs(settings).trash
             files = list(discarded.files())
-            if not files:  # those of a lost database are listed without it
+            if not files:  # files of a lost database are listed without it
                 require_database(settings.database_source)
         except MigrationError as error:
             sys.stderr.write(f"{error}\n")

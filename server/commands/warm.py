@@ -25,7 +25,7 @@ def warm() -> int:
     )
     folder = Path(os.environ[VARIABLE])
     fs.make_folder(folder)
-    with fs.open_scratch(folder):  # minutes of work that could not be kept help nobody
+    with fs.open_scratch(folder):  # avoid minutes of work that could not be saved
         pass
     say(f"Compiling into {folder}")
     for k, (name, compile_step) in enumerate(steps, 1):

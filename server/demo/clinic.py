@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from sagittal.core.simulate import Simulation
 
 GONIOMETER = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
-"""Angles of standing that are entered."""
+"""Standing angles that are entered."""
 
 FEET: tuple[Segment, ...] = ("foot_l", "foot_r")
 
 SENSORS: Mapping[Segment, str] = {segment: f"00B4D3A{i}" for i, segment in enumerate(SEGMENTS)}
-"""The clinic's own, each worn at one place."""
+"""The clinic's own sensors, each with a fixed segment."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ VISITS = (
         VOLUNTEER, "Course with turns, fast", "fast_with_turns", 31, 12, condition=replace(USUAL, pace="fast")
     ),
 )
-"""In the order of their analyses: the newest visit of each patient first."""
+"""In order of analysis: the latest visit of each patient first."""
 
 
 PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
@@ -126,7 +126,7 @@ PRESCRIBED: tuple[DemoPerson, Mapping[str, object]] = (
         "schedule": {"kind": "fading", "strides_per_share": 60, "probe_every": 30, "probe_strides": 6},
     },
 )
-"""Who is trained in live walks, and how: longer steps (server/demo/live.py)."""
+"""Prescription of the live walks: longer steps (server/demo/live.py)."""
 
 
 def record(visit: DemoVisit) -> Simulation:

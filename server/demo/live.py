@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 TITLE: Final = "Gait training with feedback, live"
 LAPS: Final = 10
 GROWTH: Final = 0.025
-"""Each lap's steps are longer by so much of the first: he learns."""
+"""Relative increase of step length per lap, as a learning effect."""
 PER_BATCH: Final = 5
 
 
@@ -83,5 +83,5 @@ async def _until(stopped: asyncio.Event, batches: Sequence[DueBatch], speed: flo
 
 
 if __name__ == "__main__":
-    walk = plan_training().recording  # takes a while; the take opens when it can be streamed at once
+    walk = plan_training().recording  # takes a while; the trial opens when it can be streamed immediately
     asyncio.run(stream_walk(sys.argv[1], open_take(load_settings()), walk))

@@ -32,7 +32,7 @@ from sagittal.server.uploads.recordings import StoredRecording
 SCHEMA: Final = 1
 _PACKED: Final = (".parquet", ".gz", ".h5", ".pdf")
 _LEVEL: Final = 1
-"""Of deflate: text packs four to one at once, and no better for ten times as long."""
+"""Deflate level: text compresses four to one quickly, and hardly better in ten times the time."""
 
 
 def write_archive(

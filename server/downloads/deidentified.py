@@ -24,6 +24,7 @@ from typing import Final
 from sqlalchemy import Connection
 
 from sagittal.core.errors import FormatError, InputError
+from sagittal.core.message import Message
 from sagittal.core.subject.condition import CHOICES
 from sagittal.server import audit
 from sagittal.server.clinic import consents, patients, sessions
@@ -43,7 +44,7 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blobs import BlobStore, IntegrityError
 
 MOST_SHIFT_DAYS: Final = 1461
-"""Four years: neither the season nor the year of a visit is told."""
+"""Four years: hides both season and year of a visit."""
 PERSON_COLUMNS: Final = ("subject", "sex", "height_m", "affected_side", "is_control")
 VISIT_COLUMNS: Final = (
     *("subject", "visit", "shifted_day", "age_years", "age_is_least", "height_m", "protocol"),
@@ -52,7 +53,7 @@ VISIT_COLUMNS: Final = (
 _KEY: Final = re.compile(r"[0-9a-f]{64}")
 _CODE: Final = re.compile(r"[A-Za-z0-9_]*")
 _CODED: Final = frozenset({"reason", "note", "excluded_reason", "source"})
-"""Columns of which only the code goes out: a person's words may stand behind it."""
+"""Columns of which only the code is exported, as free text may follow it."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,8 @@ def open_key(path: Path) -> ResearchKey:
     text = path.read_bytes().strip().decode("ascii", "replace")
     if not _KEY.fullmatch(text):
         raise InputError(
-            "bad_research_key", f"{path} is no key for research: expected 64 hex digits. Give another file."
+            "bad_research_key",
+            Message("{path} is no key for research: expected 64 hex digits. Give another file.", path=path),
         )
     return ResearchKey(bytes.fromhex(text))
 

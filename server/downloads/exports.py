@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sqlalchemy import Connection, insert, select
 
 from sagittal.core.events.edits import read_edit
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from sagittal.core.formats.source import SourceFile
 
 SIGNED: Final = "signed-"
-"""Begin of the names of the signed report's documents among the files of a job."""
+"""Prefix of the signed report's documents among the files of a job."""
 
 MEDIA_TYPES: Final = {signed_reports.PDF: "application/pdf", signed_reports.DOCUMENT: "text/html"}
 """Of the documents of a signed report, the printable one first."""
@@ -99,7 +100,12 @@ def submit(
     if chosen not in kinds.list_possible(record.files):
         lacking = ", ".join(name for name in chosen.needs if name not in record.files)
         raise Conflict(
-            "export_not_possible", f"This analysis has no {lacking}, which “{chosen.label}” requires."
+            "export_not_possible",
+            Message(
+                "This analysis has no {lacking}, which “{label}” requires.",
+                lacking=lacking,
+                label=chosen.label,
+            ),
         )
     session, patient = sessions.get(c, session_id), patients.get(c, record.patient_id)
     params = _collect_params(c, patient, session, record, [chosen])

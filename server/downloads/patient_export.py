@@ -31,9 +31,9 @@ from sagittal.server.storage.schema.person_tables import patient_identity
 from sagittal.server.storage.schema.tables import audit, metadata, now, patient, user
 
 _INTO: Final = "w"
-"""How a zip's own file is opened; on the disk nothing is."""
+"""How an entry of the zip is opened; nothing is written to disk."""
 SECRET: Final = frozenset({"code_sha256", "token_sha256"})
-"""Columns that open something; they are nobody's data."""
+"""Columns with credentials, which are not patient data."""
 _ENCRYPTED: Final = patient_identity.name
 
 
@@ -55,7 +55,7 @@ def list_rows(c: Connection, patient_id: str) -> dict[str, list[dict[str, Any]]]
     while grows:
         grows = False
         for table in metadata.sorted_tables:
-            # whoever wrote a row is not whom it is about
+            # the author of a row is not the patient it is about
             keys = [key for key in table.foreign_keys if key.column.table.name in ids.keys() - {user.name}]
             if keys and table.name != _ENCRYPTED:
                 mine = or_(*(key.parent.in_(ids[key.column.table.name]) for key in keys))
@@ -111,7 +111,7 @@ def _zip(
     missing: list[dict[str, str]],
 ) -> Iterator[bytes]:
     sink = ZipSink()
-    # stored as it is: recordings hardly shrink, and the server has others to serve
+    # stored uncompressed: recordings hardly shrink, and the server has other requests to serve
     with zipfile.ZipFile(sink, "w", zipfile.ZIP_STORED) as archive:
         text = json.dumps(rows, ensure_ascii=False)
         named = {one: name for one, name in people.items() if one in text}

@@ -17,6 +17,7 @@ from sqlalchemy import Connection
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.frames import Protocol
+from sagittal.core.message import Message
 from sagittal.server.auth.identity import Identity
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.clinic.patients import Patient
@@ -37,7 +38,7 @@ from sagittal.server.storage.schema.tables import now
 from sagittal.server.uploads import recordings
 
 MOST_VISITS: Final = 300
-"""Of one study; more are asked for in parts."""
+"""Per study; larger ones must be requested in parts."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,12 @@ def check_size(chosen: Sequence[Session]) -> None:
     if len(chosen) > MOST_VISITS:
         raise Conflict(
             "too_many_visits",
-            f"{len(chosen)} visits match; a study can have at most {MOST_VISITS}. Choose shorter periods "
-            "and merge the tables.",
+            Message(
+                "{chosen} visits match; a study can have at most {MOST_VISITS}. Choose shorter periods and "
+                "merge the tables.",
+                chosen=len(chosen),
+                MOST_VISITS=MOST_VISITS,
+            ),
         )
 
 
@@ -149,7 +154,7 @@ def _open_take(
         elif "strides.csv" in record.files:
             strides = analyses.file_bytes(reviewed.blobs, record, "strides.csv")
     except StoreAway:
-        raise  # it is not this visit that cannot be read
+        raise  # the problem is not this visit's data
     except SagittalError as refused:
         error = refused
     return StudyTake(name, labels, len(files), _hide_names(files), error, lambda: analysis, lambda: strides)

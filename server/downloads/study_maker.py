@@ -18,7 +18,7 @@ from sagittal.server.storage.db import Database
 
 CHILD: Final = "sagittal.server.downloads.study_child"
 LONGEST_S: Final = 300.0
-"""Longest one may take; the most visits that are allowed take some ten seconds of computing."""
+"""Time limit; the maximum number of visits takes some ten seconds."""
 
 _turn = ErrandTurn()
 
@@ -56,7 +56,7 @@ def fetch_study(
             "study_failed", "The process that makes the tables has ended. Choose fewer visits."
         ) from error
     reply = msgspec.msgpack.decode(answer, type=StudyReply)
-    if reply.code in {"no_visits", "too_many_visits"}:  # changed since it was looked at
+    if reply.code in {"no_visits", "too_many_visits"}:  # changed since it was checked
         raise Conflict(reply.code, reply.message)
     if reply.code:
         raise StudyFailed(reply.code, reply.message)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 OLDEST: Final = 89
-"""Who is as old or older is not told apart: there are few of them."""
+"""Ages from here on are not distinguished, as there are few such patients."""
 
 
 def coarsen_age(age: int | None) -> int | None:

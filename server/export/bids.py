@@ -34,10 +34,10 @@ PLACES: Final[dict[Segment, str]] = {
     "foot_r": "right foot",
     "chest": "chest",
 }
-"""Segment → where its sensor sits, in words."""
+"""Segment → description of its sensor placement."""
 
 KINDS: Final = (("acc", "", "ACCEL", "m/s^2", 1.0), ("gyr", "_dps", "GYRO", "rad/s", np.pi / 180.0))
-"""Columns of signals.parquet → type and unit of the channel, and the factor between."""
+"""Columns of signals.parquet → type and unit of the channel, and conversion factor."""
 
 
 def write_bids(content: ExportContent) -> bytes:

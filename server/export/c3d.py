@@ -25,16 +25,16 @@ from sagittal.server.export.content import CycleRow, ExportContent
 from sagittal.server.export.zipping import zip_files
 
 FRAMES: Final = 65_535
-"""Frames of a file at most."""
+"""Maximum number of frames per file."""
 
 ENTRIES: Final = 255
-"""Entries of a list at most."""
+"""Maximum number of entries per list."""
 
 TEXT: Final = 127
-"""Characters of an entry at most."""
+"""Maximum number of characters per entry."""
 
 POINT_BYTES: Final = 16
-"""Of a marker or an angle in a frame: three numbers, and what is known about them."""
+"""Per marker or angle and frame: three numbers and a residual."""
 
 EVENT_NAMES: Final = {"ic": ("Foot Strike", 1), "tc": ("Foot Off", 2)}
 """Kind of contact → label and icon, as motion-capture programs write them."""
@@ -161,7 +161,7 @@ def _write_part(
         path = Path(folder) / "walk.c3d"
         file.write(str(path))
         written = path.read_bytes()
-    # ezc3d does not tell that the disk was full
+    # ezc3d does not report a full disk
     if len(written) < points.shape[2] * points.shape[1] * POINT_BYTES:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
     return written

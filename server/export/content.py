@@ -27,7 +27,7 @@ from sagittal.server.report.words.estimator import list_estimated_angles, list_e
 
 POSES = "poses.parquet"
 LATER = (POSES, signals.NAME, tracks.NAME)
-"""Files that are read only where an export needs them."""
+"""Files read only by exports that need them."""
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ def open_content(
     stored_tracks = tracks.read_tracks(content.read_needed(tracks.NAME), stored.events, stored.angles)
     measured = measure_gait(stored_tracks, edits)
     reviewed = apply_review(stored, measured, edits)
-    # as an analysis stores them: what is not finite is undefined
+    # as stored by an analysis: non-finite values are undefined
     rows: list[dict[str, Any]] = [parameter_row(p) for p in reviewed.parameters]
     reviewed = replace(reviewed, parameters=tuple(Parameter(**row) for row in rows))
     return replace(content, bundle=reviewed, columns=measured.columns)

@@ -21,10 +21,10 @@ from sagittal.server.report.view.level import define_parameter, label_parameter
 from sagittal.server.report.words.wording import reason_words
 
 CODES: Final = "urn:sagittal:gait-parameters"
-"""System of our codes: names of the catalogue, which the bundle's CodeSystem defines."""
+"""Code system of our catalogue, defined by the bundle's CodeSystem."""
 
 SUBJECTS: Final = "urn:sagittal:subjects"
-"""System of the clinic's pseudonyms."""
+"""Identifier system of the clinic's pseudonyms."""
 
 LOINC: Final = {
     "tug_duration_s": (
@@ -32,7 +32,7 @@ LOINC: Final = {
         "Time to rise from chair, walk 10 feet and back, and return to sitting [TUG]",
     ),
 }
-"""Parameter → LOINC code and its name, of the same measurement."""
+"""Parameter → LOINC code and name of the same quantity."""
 
 require_entries(LOINC, "sagittal.server.export.fhir")
 
@@ -60,7 +60,7 @@ SPREAD: Final = {
     "standard_deviation": ("Standard deviation over them", None),
     "uncertainty_95": ("The value ± this holds the true one with 95 %", None),
 }
-"""Components of an observation → words, and their UCUM unit where it is not the value's."""
+"""Components of an observation → words, and UCUM unit if it differs from the value's."""
 
 REPORT: Final = ("gait_analysis", "Gait analysis by body-worn inertial sensors")
 EARLIER: Final = "The attached report was signed before these numbers were changed."

@@ -73,10 +73,10 @@ KINDS: Final[tuple[ExportKind, ...]] = (
         (POSES,),
     ),
 )
-"""In the order in which they are offered."""
+"""In display order."""
 
 EXPORTED: Final = "export-"
-"""Begin of the name of an export among the files of its analysis."""
+"""Prefix of an export's name among the files of its analysis."""
 
 NAMES: Final[tuple[str, ...]] = get_args(ExportName)
 
@@ -100,7 +100,7 @@ def list_possible(files: Collection[str]) -> tuple[ExportKind, ...]:
 
 
 DRAWN: Final[dict[str, Callable[[ExportContent], bytes]]] = {}
-"""Formats that a room above this one draws, by name; it registers its writer."""
+"""Formats written by a higher-level package, by name, which registers its writer."""
 
 
 def write_export(name: str, content: ExportContent) -> bytes:

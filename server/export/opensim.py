@@ -29,7 +29,7 @@ LEG: Final = (
     ("knee_flexion", "knee_angle"),
     ("ankle_dorsiflexion", "ankle_angle"),
 )
-"""Our joint angle → its coordinate; the signs are the same on both sides."""
+"""Our joint angle → its coordinate; signs are the same on both sides."""
 
 IMU_NAMES: Final[Mapping[Segment, str]] = {
     "pelvis": "pelvis_imu",
@@ -41,7 +41,7 @@ IMU_NAMES: Final[Mapping[Segment, str]] = {
     "foot_l": "calcn_l_imu",
     "chest": "torso_imu",
 }
-"""Segment → the frame that OpenSense looks for in the model."""
+"""Segment → frame expected by OpenSense in the model."""
 
 
 def write_opensim(content: ExportContent) -> bytes:
@@ -119,7 +119,7 @@ def write_orientations(poses: Poses, instrumented: Collection[str]) -> bytes:
     cells = []
     for segment in segments:
         q = poses.q[segment][ok]
-        # neighbours on one side of the sphere, so that who interpolates stays on it
+        # keep consecutive quaternions in the same hemisphere, for interpolation
         flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(axis=1) < 0.0, -1.0, 1.0))
         q = q * np.concatenate(([1.0], flips))[:, None] if len(q) else q
         cells.append([",".join(f"{x:.9f}" for x in row) for row in q.tolist()])

@@ -11,6 +11,7 @@ from math import degrees, isfinite
 from typing import Final
 
 from sagittal.core.frames import SUFFIX
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE, name_counted, unit_of
 from sagittal.core.parameters.kinematic import POINTS, cycle_curves, mean_curve
 from sagittal.core.parameters.result import MeanCurve
@@ -59,7 +60,7 @@ TABLE_COLUMNS: Final = {
     "kind": "ic = initial contact, tc = terminal contact (foot-off)",
     "source": "Which detector found the contact; manual = a person",
 }
-"""Columns of the tables that are no parameters → what they hold."""
+"""Columns that are not parameters → definition."""
 
 
 def list_about(content: ExportContent) -> TableSheet:
@@ -82,7 +83,7 @@ def list_about(content: ExportContent) -> TableSheet:
         ("estimated_angles", " ".join(content.estimated) or None),
         ("angle_zero", None if angles is None else angles.zero),
         ("edits", len(content.edits)),
-        ("exported_by", f"Sagittal {v.version}".strip()),
+        ("exported_by", Message("Sagittal {version}", version=v.version).strip()),
         ("analysed_by", origin.get("version")),
         ("parameters_sha256", origin.get("parameters_sha256")),
         *((f"input_sha256 {name}", digest) for name, digest in (origin.get("input_sha256") or {}).items()),

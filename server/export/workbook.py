@@ -13,10 +13,10 @@ from sagittal.server.export import sheets
 from sagittal.server.export.content import ExportContent
 
 MADE: Final = dt.datetime(1980, 1, 1, tzinfo=dt.UTC)
-"""Date in the file's properties; one date, so that the same analysis gives the same bytes."""
+"""Fixed date in the file's properties, so that the same analysis gives the same bytes."""
 
 WIDEST: Final = 60
-"""Widest column, characters."""
+"""Maximum column width, characters."""
 
 
 def write_workbook(content: ExportContent) -> bytes:

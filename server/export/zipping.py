@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 EARLIEST: Final = (1980, 1, 1, 0, 0, 0)
-"""Time of every member, the earliest that a zip knows, so that the same content gives the same bytes."""
+"""Timestamp of every member, the earliest allowed in a zip, so that the same content gives the same bytes."""
 
 
 def zip_files(files: Mapping[str, bytes]) -> bytes:

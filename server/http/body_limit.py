@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import MutableMapping
+from typing import Any
 
 from starlette.datastructures import Headers
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
+from sagittal.core.message import Message
 from sagittal.server.http.problems import Problem, send_problem
 
 MAX_BODY_BYTES = 1_000_000
@@ -28,7 +31,12 @@ class BodyLimit:
             await self.app(scope, receive, send)
             return
         problem = Problem(
-            413, "too_large", f"A request other than a file has at most {MAX_BODY_BYTES} bytes. Send less."
+            413,
+            "too_large",
+            Message(
+                "A request other than a file has at most {MAX_BODY_BYTES} bytes. Send less.",
+                MAX_BODY_BYTES=MAX_BODY_BYTES,
+            ),
         )
         declared = Headers(scope=scope).get("content-length", "0")
         if not declared.isdecimal() or int(declared) > MAX_BODY_BYTES:
@@ -36,7 +44,7 @@ class BodyLimit:
             return
         total = 0
 
-        async def counted() -> Message:
+        async def counted() -> MutableMapping[str, Any]:
             nonlocal total
             message = await receive()
             total += len(message.get("body", b""))

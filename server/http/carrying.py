@@ -39,7 +39,7 @@ async def carry_messages(
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
         code, reason = _close_code(up) if end_reason is None else (WS_1008_POLICY_VIOLATION, end_reason)
-        # the client may be gone already
+        # the client may have disconnected
         with contextlib.suppress(RuntimeError, WebSocketDisconnect):
             await ws.close(code, reason)
 

@@ -10,11 +10,11 @@ CONTENT_POLICY = (
     "base-uri 'none'; form-action 'self'; frame-ancestors 'self'"
 )
 KEPT = "public, max-age=31536000, immutable"
-"""Cache-Control of an answer whose address carries a hash of it."""
+"""Cache-Control of a response whose URL contains its hash."""
 
 
 HTTPS_ONLY = "max-age=31536000"
-"""A year, for this host alone: what stands beside it is not ours to decide."""
+"""One year, for this host only: neighbouring hosts are not ours to decide."""
 
 
 def allow_camera(origins: str) -> str:
@@ -40,7 +40,7 @@ _FIXED = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "X-Frame-Options": "SAMEORIGIN",
     "Permissions-Policy": allow_camera("()"),
-    # clinical pages must not stay on a shared tablet after sign-out
+    # clinical pages must not remain on a shared tablet after sign-out
     "Cache-Control": "no-store",
 }
 

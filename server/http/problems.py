@@ -20,7 +20,8 @@ from starlette.routing import Match, Mount
 from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketState
 
-from sagittal.core.errors import SagittalError
+from sagittal.core.errors import SagittalError, title_of_code
+from sagittal.core.message import Message
 from sagittal.server.http.headers import add_security_headers
 from sagittal.server.http.templates import render
 from sagittal.server.log import request_id
@@ -34,7 +35,7 @@ MEDIA_TYPE = "application/problem+json"
 METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 
 
-# all other exceptions go on to the server, which logs them
+# all other exceptions propagate to the server, which logs them
 LOGGED_HERE = (SagittalError, OperationalError)
 
 
@@ -60,7 +61,7 @@ class Problem(HTTPException):
         """Return the members of RFC 9457 §3.1 plus `code` and, for invalid fields, `errors`."""
         body: dict[str, Any] = {
             "type": f"urn:sagittal:problem:{self.code}",
-            "title": self.code.replace("_", " ").capitalize(),
+            "title": title_of_code(self.code),
             "status": self.status,
             "detail": self.detail,
             "code": self.code,
@@ -86,8 +87,10 @@ def as_problem(error: Exception) -> Problem:
         return Problem(
             422,
             "invalid_request",
-            "The request does not have the expected form: "
-            + "; ".join(f"{f['field']}: {f['message']}" for f in fields[:5]),
+            Message(
+                "The request does not have the expected form: {join}",
+                join="; ".join(f"{f['field']}: {f['message']}" for f in fields[:5]),
+            ),
             errors=fields,
         )
     if isinstance(error, AnyHttpException):
@@ -155,12 +158,12 @@ def install(app: FastAPI) -> None:
     async def handle(connection: HTTPConnection, error: Exception) -> Response | None:
         problem = as_problem(error)
         if _names_nothing(error) and _wants_page(connection):
-            problem = Problem(404, "not_found", SENTENCES["not_found"])  # an address cut short
+            problem = Problem(404, "not_found", SENTENCES["not_found"])  # a truncated URL
         if problem.status == HTTPStatus.METHOD_NOT_ALLOWED:
             problem.headers = {**(problem.headers or {}), **_list_allowed(connection.scope)}
         if problem.status == HTTPStatus.INTERNAL_SERVER_ERROR and isinstance(error, LOGGED_HERE):
             log.error("%s %s", connection.scope["type"], problem.code, exc_info=error)
-        if isinstance(error, IntegrityError):  # somebody must restore it: one line says which
+        if isinstance(error, IntegrityError):  # it must be restored: one log line identifies it
             log.error("%s: %s", problem.code, error.message)
         if problem.status == HTTPStatus.INSUFFICIENT_STORAGE:
             log.warning("%s refused: %s", connection.scope["type"], problem.code)
@@ -168,7 +171,7 @@ def install(app: FastAPI) -> None:
             await refuse_websocket(connection, problem)
             return None
         response = problem_response(problem, connection)
-        # Starlette answers 500 outside of all middleware
+        # Starlette responds with 500 outside all middleware
         add_security_headers(response.headers)
         current_id = request_id.get()
         if current_id is not None:
@@ -176,7 +179,7 @@ def install(app: FastAPI) -> None:
         return response
 
     async def handle_disk(connection: HTTPConnection, error: Exception) -> Response | None:
-        # of another kind: to the server, which logs it, and to the handler of everything
+        # of another kind: handled by the server, which logs it, and by the general handler
         if refusal_of(error) is None:
             raise error
         return await handle(connection, error)
@@ -198,7 +201,7 @@ def install(app: FastAPI) -> None:
 def _wants_page(connection: HTTPConnection) -> bool:
     if connection.scope["type"] != "http" or "text/html" not in connection.headers.get("accept", ""):
         return False
-    # a form of a page without scripts posts to the API and is a browser's page request all the same
+    # a form of a page without scripts posts to the API and is also a page request of a browser
     is_form = connection.headers.get("content-type", "").startswith("application/x-www-form-urlencoded")
     return is_form or not connection.url.path.startswith(("/api/", "/health/", "/static/"))
 

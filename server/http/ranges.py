@@ -9,7 +9,7 @@ from typing import Final
 from starlette.responses import Response, StreamingResponse
 
 PIECE: Final = 1 << 20
-"""Bytes that are read at once."""
+"""Bytes read at a time."""
 _RANGE: Final = re.compile(r"bytes=(\d{0,18})-(\d{0,18})")
 
 
@@ -52,7 +52,8 @@ def _stream(
     status: int,
     headers: Mapping[str, str],
 ) -> StreamingResponse:
-    # the first piece is read here: what is wrong with the file is an answer, not a cut connection
+    # the first part is read here, so that a file error gives an error response rather than a broken
+    # connection
     first = read(start, min(start + PIECE, stop)) if stop > start else b""
 
     def rest() -> Iterator[bytes]:

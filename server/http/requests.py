@@ -20,9 +20,9 @@ from sagittal.server.log import request_id
 log = logging.getLogger(__name__)
 
 NO_ROUTE: Final = "none"
-"""In the place of the pattern where an address has none."""
+"""Label for addresses without a route."""
 _PREFIXES: Final = ("/api/v1", "/static")
-"""What routes are mounted under: a route's own pattern does not have it."""
+"""Prefixes of mounted routes, which a route's own pattern lacks."""
 
 
 class RequestObserver:
@@ -44,10 +44,10 @@ class RequestObserver:
             await self.app(scope, receive, send)
             return
         own = secrets.token_hex(8)
-        # never taken back: what a server logs of a failed request comes after this, in the same task
+        # never reset: the server's log of a failed request is written later in the same task
         request_id.set(own)
         began = time.perf_counter()
-        status = 500  # nothing was answered
+        status = 500  # no response was sent
 
         async def with_id(message: Message) -> None:
             nonlocal status

@@ -69,7 +69,7 @@ class KeptBytecode(FileSystemBytecodeCache):
 
     def __init__(self, language: str) -> None:
         super().__init__(os.environ[VARIABLE], f"{language}_%s.template")
-        # now: after an upgrade below a running process the files are no longer those that it has read
+        # at start: after an upgrade during operation the files no longer match the loaded ones
         self._pages = fingerprint_pages()
 
     def get_source_checksum(self, source: str) -> str:

@@ -32,15 +32,15 @@ log = logging.getLogger(__name__)
 QUEUE: Final = "jobs"
 DELIVER: Final = "deliver"
 SLOW_POLL_S: Final = 5.0
-"""An idle worker looks into the table at least so often, and once in the time of a lease."""
+"""Maximum interval at which an idle worker polls the table, and once per lease."""
 RETRY_S: Final = 2.0
-"""Pause before a broken line to PostgreSQL is tried again."""
+"""Pause before a broken connection to PostgreSQL is retried."""
 PATIENCE_S: Final = 5.0
-"""How long the line waits for a connection before it is given up and made anew."""
+"""Time limit for connecting before the connection is recreated."""
 STOP_S: Final = 0.2
-"""An idle worker sees within this time that it is to stop; it asks nobody for that."""
+"""Maximum time for an idle worker to notice that it should stop."""
 FORGET: Final = "*/10 * * * *"
-"""When deliveries to workers that were killed are removed (cron)."""
+"""When deliveries to killed workers are removed (cron)."""
 
 
 class DeliveredQueue(TableQueue):
@@ -139,7 +139,7 @@ class DeliveryLine:
         @app.task(name="forget_lost", queue=QUEUE)
         async def _forget_lost(timestamp: int) -> None:
             for lost in await app.job_manager.get_stalled_jobs(queue=QUEUE):
-                with suppress(ConnectorException):  # another worker was quicker
+                with suppress(ConnectorException):  # another worker was faster
                     await app.job_manager.finish_job(lost, Status.FAILED, delete_job=True)
 
         return app
@@ -162,7 +162,7 @@ class DeliveryLine:
             self._running = None
 
     async def _take(self) -> None:
-        try:  # not as a context: a pool that is cancelled while it opens has tasks that only closing ends
+        try:  # not as a context manager: a pool cancelled while opening has tasks that only closing ends
             await self._app.open_async()
             await self._app.run_worker_async(
                 queues=[QUEUE],

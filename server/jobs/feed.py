@@ -22,7 +22,7 @@ from sagittal.server.storage.schema.tables import job
 log = logging.getLogger(__name__)
 
 INTERVAL_S = 0.2
-"""Pause between two looks; a look without a change reads no table."""
+"""Polling interval; a poll without a change reads no table."""
 
 
 class JobFeed:

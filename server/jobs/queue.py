@@ -31,7 +31,7 @@ COMPARE_FILTERS: Final = "compare_filters"
 SENSITIVITY: Final = "sensitivity"
 EXPORT: Final = "export"
 BESIDE: Final = (TUNE, COMPARE_FILTERS, SENSITIVITY, EXPORT)
-"""Kinds of jobs beside a visit's analysis: it stays what pages show, whatever becomes of them."""
+"""Jobs other than a visit's analysis; they do not affect the state shown on pages."""
 
 JobState = Literal["queued", "running", "done", "failed", "cancelled"]
 
@@ -104,10 +104,10 @@ class Priority(IntEnum):
     """Order in which jobs are claimed, smallest first."""
 
     IN_FRONT = -1
-    """Somebody waits in front of the screen."""
+    """A user is waiting for it."""
     USUAL = 0
     BEHIND = 10
-    """Runs for long and leaves checkpoints: it makes way for every other job."""
+    """Long-running with checkpoints: yields to all other jobs."""
 
 
 class LeaseState(Enum):
@@ -115,7 +115,7 @@ class LeaseState(Enum):
 
     OURS = "ours"
     YIELD = "yield"
-    """This job is behind and another one waits: give it back, it goes on from its checkpoint."""
+    """A low-priority job while another one is queued: release it; it resumes from its checkpoint."""
     CANCEL = "cancel"
     LOST = "lost"
 

@@ -27,9 +27,9 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.schema.tables import ACTIVE_STATES, job, new_id, now
 
 POLL_S = 0.2
-"""Pause between two looks for work; a look is one read of an index."""
+"""Polling interval; a poll is one index read."""
 MAX_DEATHS = 3
-"""Silent deaths of workers after which a job is given up."""
+"""Number of worker crashes after which a job fails."""
 
 POISONED = (
     f"worker died {MAX_DEATHS} times on this job without a word: it may need more memory than allowed, or "
@@ -71,7 +71,7 @@ class TableQueue:
         row = c.execute(select(*VIEW_COLUMNS).where(same)).first()
         if row:
             return job_view(row)
-        # one that is being cancelled still holds the key; it is not the one that was asked for now
+        # a job being cancelled still holds the key, but is not the one requested now
         c.execute(
             update(job)
             .where(job.c.key == key, job.c.state.in_(ACTIVE_STATES))
@@ -166,7 +166,7 @@ class TableQueue:
         if row.cancel_requested:
             return LeaseState.CANCEL
         if row.priority < Priority.BEHIND:
-            return LeaseState.OURS  # it leaves no checkpoints: what is done of it would be lost
+            return LeaseState.OURS  # it has no checkpoints, so its work would be lost
         urgent = select(job.c.seq).where(job.c.state == "queued", job.c.priority < row.priority).limit(1)
         return LeaseState.YIELD if self._db.ask(urgent) else LeaseState.OURS
 

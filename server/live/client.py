@@ -24,10 +24,10 @@ __all__ = ["LiveError", "StreamFaults", "StreamReport", "stream"]
 
 FIRST_PAUSE_S: Final = 0.1
 LONGEST_PAUSE_S: Final = 2.0
-"""Pause before connecting again, doubled each time in vain."""
+"""Maximum pause before reconnecting, doubled after each failure."""
 
 SILENCE_S: Final = 5.0
-"""A connection that answers nothing for so long is given up and made anew."""
+"""A connection without response for this long is replaced."""
 
 
 async def stream(
@@ -86,7 +86,7 @@ async def _until_finished(sender: Sender, url: str, patience_s: float) -> None:
                 max_size=MOST_MESSAGE_BYTES,
                 open_timeout=10,
                 close_timeout=2,
-                ping_interval=SILENCE_S / 2,  # a network that is gone says nothing by itself
+                ping_interval=SILENCE_S / 2,  # a broken network connection is not reported
                 ping_timeout=SILENCE_S / 2,
             ) as ws:
                 await sender.serve(ws)

@@ -24,19 +24,20 @@ from sagittal.server.storage.segments import TakeLog
 log = logging.getLogger(__name__)
 
 INTERVAL_S = 0.2
-"""Longest time a written record waits for its group to be synced; with the sync itself within 250 ms."""
+"""Maximum delay before a written record is synced with its group; including the sync within 250 ms."""
 
 SYNCERS = 4
-"""Logs synced at the same time: they share the file system's commits (measured, 200 logs: one after the other
-46 ms, four at a time 22 ms on an idle disk, 380 and 40 ms on a busy one)."""
+"""Logs synced concurrently: they share the file system's commits (measured, 200 logs: one after the other 46
+ms, four at a time 22 ms on an idle disk, 380 and 40 ms on a busy one).
+"""
 
 BREATH_S = 0.004
-"""Shortest time between two rounds of writing: with many takes a round carries many records, and the thread
-and the event loop do not pass the interpreter to each other for each of them (measured with 200 tablets: a
-third of the CPU)."""
+"""Minimum time between two rounds of writing: with many trials a round writes many records, which reduces
+switching between the thread and the event loop (measured with 200 tablets: a third of the CPU).
+"""
 
 Post = Callable[[Callable[[Any], None], Any], None]
-"""How the thread tells the event loop: call this with that; tests call directly."""
+"""Posts a call to the event loop; tests call directly."""
 
 
 class LoopMailbox:
@@ -52,11 +53,11 @@ class LoopMailbox:
         self._calls.append((callback, value))
         if not self._under_way:
             self._under_way = True
-            with contextlib.suppress(RuntimeError):  # the loop has ended: nobody is left to be told
+            with contextlib.suppress(RuntimeError):  # the loop has ended, so there is no recipient
                 self.loop.call_soon_threadsafe(self._deliver)
 
     def _deliver(self) -> None:
-        # before the first is taken: what is posted from here on is taken too, or wakes the loop again
+        # before taking the first: later calls are taken as well, or wake the loop again
         self._under_way = False
         while self._calls:
             callback, value = self._calls.popleft()

@@ -32,9 +32,9 @@ from sagittal.server.storage.files.blobs import BlobStore
 log = logging.getLogger(__name__)
 
 DRAIN_S: Final = 10.0
-"""Time the estimator has for what it has not told when a take ends."""
+"""Time limit for the estimator's remaining results at the end of a trial."""
 AGAIN_S: Final = 30.0
-"""Pause before a take that could not be stored (disk full) is tried again."""
+"""Pause before storing a trial is retried (disk full)."""
 
 
 class Ending:
@@ -104,7 +104,7 @@ class Ending:
                 self._over(await asyncio.to_thread(self._rows.take, take.id))
             take.over.set()
             await self._drain(take)
-            # before the log goes: an estimator that gets to this take only later finds it ended, not lost
+            # before the log is removed: a late estimator then sees an ended trial, not a lost one
             self._pool.leave(take.id)
             path = live_recordings.log_path(self._settings.live, take.id)
             await asyncio.to_thread(fs.remove_file, path)

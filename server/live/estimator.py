@@ -106,7 +106,7 @@ def main() -> None:
     line, _ = enter_child()
     compile_kernels()
     gc.collect()
-    gc.freeze()  # what libraries hold is never garbage: looking through it again costs every take 50 ms
+    gc.freeze()  # exclude library objects from garbage collection, which would cost 50 ms per trial
     line.send(encode(EstimatorReady()))
     try:
         follow(line)
@@ -117,7 +117,7 @@ def main() -> None:
 def follow(line: Channel) -> None:
     """Alternate between orders and logs; raises EOFError if the peer has closed."""
     estimator = EstimatorWorker(lambda report: line.send(encode(report)))
-    # one poll object for all: this is asked hundreds of times a second
+    # one shared poll object, as this is called hundreds of times a second
     orders = select.poll()
     orders.register(line.fileno(), select.POLLIN)
     while True:
@@ -125,7 +125,7 @@ def follow(line: Channel) -> None:
         if not estimator.has_work:
             due = estimator.due_at
             wait = None if due is None else max(0.0, due - time.monotonic())
-        # all orders that are there first: what has come meanwhile is read in one go
+        # all pending orders first, so that new data are read at once
         while orders.poll(None if wait is None else ceil(1000.0 * wait)):
             estimator.obey(decode_order(line.receive()))
             wait = 0.0
@@ -137,7 +137,7 @@ def compile_kernels() -> None:
     from sagittal.core.online import compile_live_kernels
     from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 
-    # what a walk needs first: workers analyse while the rest is compiled here
+    # filters of a walk first: workers can analyse while the rest is compiled here
     compile_filters_once(OFFLINE)
     compile_live_kernels()
 

@@ -44,19 +44,22 @@ from sagittal.server.live.messages import (
     LogProcessed,
     Picture,
     Report,
+    encode_json,
 )
 from sagittal.server.report.words.guided_words import tell_person
 
 CHUNK_BYTES: Final = 1 << 14
-"""Read and estimated in one turn, half a second of seven sensors: who catches up lets others through."""
+"""Bytes processed at a time, half a second of seven sensors, so that catching up does not block
+other trials.
+"""
 EVERY_S: Final = 1 / 30
-"""Pictures are sent no more often (docs/reference/architecture.md, "The 3D figure")."""
+"""Minimum interval of pictures (docs/reference/architecture.md, "The 3D figure")."""
 SLOW_S: Final = 0.2
-"""What is for reading (sensors, calibration) is made anew no more often."""
+"""Minimum interval of updating text parts (sensors, calibration)."""
 DRIFT: Final = 1e-4
-"""Clocks run apart by less than this (100 ppm): the fastest path may become so much longer."""
+"""Maximum clock drift (100 ppm), by which the fastest transmission may become slower."""
 PICTURE_TRAILS: Final = 400
-"""Pieces of angles kept for the next picture while a take catches up: older ones no chart shows any more."""
+"""Angle samples buffered for the next picture while a trial catches up; charts show no older ones."""
 
 
 class Follower:
@@ -190,7 +193,7 @@ class Follower:
             self._next_seq = batch.seq + 1
             if frame is not None:
                 self._tell(frame)
-                # once a second that takes milliseconds: the cue is out by now
+                # takes milliseconds once a second, after the cue has been sent
                 for notice in self._online.compare_sensors():
                     self._item("notice", notice.t_s, wire.notice(notice))
                 self._guided = self._online.guide_test()
@@ -243,7 +246,7 @@ class Follower:
         if state.guard.state != self._guard:
             self._guard = state.guard.state
             self._item("guard", None if self._last is None else self._last.t_s, wire.feedback(state))
-        body = wire.encode(wire.feedback(state))
+        body = encode_json(wire.feedback(state))
         if body != self._standing:
             self._standing = body
             self._say(FeedbackStatus(self.take, body))
@@ -251,7 +254,7 @@ class Follower:
     def _item(self, kind: Kind, t_s: float | None, content: dict[str, Any]) -> None:
         if self._late:
             content["late"] = True
-        self._say(FeedItem(self.take, kind, self._said[kind], t_s, wire.encode(content), self._late))
+        self._say(FeedItem(self.take, kind, self._said[kind], t_s, encode_json(content), self._late))
         self._said[kind] += 1
 
     def _note_arrival(self, batch: SampleBatch, end: int) -> None:
@@ -307,7 +310,7 @@ class _Phase:
         for side in SIDES:
             contact, length = self._contact.get(side), self._length.get(side)
             share = None if contact is None or not length else 100.0 * (t_s - contact) / length
-            # half a cycle too late: the person has stopped
+            # half a cycle overdue: the subject has stopped
             phases[side] = None if share is None or not 0.0 <= share <= 150.0 else min(share, 100.0)
         return phases
 
@@ -330,7 +333,7 @@ def _engine(begin: FollowTake) -> FeedbackEngine | None:
 
 
 def _protocol(name: str) -> Protocol:
-    return cast("Protocol", name)  # the database holds only known ones
+    return cast("Protocol", name)  # the database contains only known ones
 
 
 def describe_failure(error: Exception) -> Notice:

@@ -12,7 +12,6 @@ import time
 from collections.abc import Coroutine
 from typing import Any, Final
 
-import msgspec
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.formats.live_log import Hello
@@ -32,6 +31,7 @@ from sagittal.server.live.messages import (
     LogProcessed,
     Picture,
     Report,
+    encode_json,
 )
 from sagittal.server.live.pool import EstimatorPool
 from sagittal.server.live.protocol import CloseCode
@@ -48,15 +48,15 @@ from sagittal.server.storage.db import Database
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.1
-"""How often silence is looked for; staleness is half a second."""
+"""Interval of checks for silence; data are stale after half a second."""
 STATE_S: Final = 1.0
-"""How often the running counters are told."""
+"""Interval of sending the running counters."""
 GRACE_S: Final = 3.0
-"""Time a take that is just ending has when the server stops; after a kill the next start does the rest."""
+"""Time limit for trials that are ending when the server stops; after a kill the next start completes them."""
 MIND_S: Final = 2.0
-"""How often a web server among several looks whether its takes are still its own."""
+"""Interval at which one of several web servers checks ownership of its trials."""
 ABANDONED_S: Final = live.TOKEN_LIFE.total_seconds()
-"""A take that no tablet has spoken to for so long is ended: no token opens it any more."""
+"""A trial without a tablet for this long is ended, since its tokens have expired."""
 
 
 class Hub:
@@ -89,7 +89,7 @@ class Hub:
     async def start(self) -> None:
         """Warm up the estimators, complete interrupted work and open unfinished trials."""
         self._loop = asyncio.get_running_loop()
-        # getting warm takes seconds, with new filters half a minute: not while somebody walks already
+        # warming up takes seconds, with new filters half a minute: do it before the first walk
         self.pool.start()
         self._committer.start()
         self.journal.start()
@@ -100,7 +100,7 @@ class Hub:
             try:
                 await self.enter(await asyncio.to_thread(self.rows.take, take_id), None)
             except Exception:
-                # its log stays as it is; the other takes and the clinic go on
+                # its log remains unchanged; other trials and the clinic are unaffected
                 log.exception("live take %s could not be opened again", take_id)
         self._ticking = [asyncio.create_task(self._tick())]
         if self.nodes.is_one_of_several:
@@ -119,7 +119,7 @@ class Hub:
             await take.recorder.close()
             if take.tablet is not None:
                 take.tablet.shut(CloseCode.GOING_AWAY, "server_stops")
-        # the acknowledgements of what close has just synced are on their way through the loop
+        # the acknowledgements of the data synced by close are still queued in the loop
         await asyncio.sleep(0)
         await self.pool.stop()
         await asyncio.to_thread(self._committer.stop)
@@ -275,18 +275,18 @@ class Hub:
     def tell_state(self, take: ActiveTake) -> None:
         """Send the state of a trial to browsers, unless it has ended (see `_tell_over`)."""
         if self._takes.get(take.id) is take:
-            take.room.say("state", msgspec.json.encode(take.standing()))
+            take.room.say("state", encode_json(take.standing()))
 
     def tell_row(self, row: live.LiveTakeRecord) -> None:
         """Send the state of a trial without a tablet to browsers."""
         take = self._takes.get(row.id)
         if take is None:
             self.room(row.session_id).clear()
-            self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
+            self.room(row.session_id).say("state", encode_json(describe_unjoined(row)))
         else:
             self.tell_state(take)
 
-    # what the take tells
+    # events of the trial
 
     def note_started(self, take: ActiveTake) -> None:
         """Register the first batch."""
@@ -317,7 +317,7 @@ class Hub:
             return
         match report:
             case Picture() | FeedbackStatus() if draining is not None:
-                pass  # the session may have another take by now
+                pass  # the session may have another trial by now
             case LogProcessed():
                 take.told.set()
             case Picture():
@@ -346,7 +346,7 @@ class Hub:
         self._takes.pop(take.id, None)
 
     def _tell_over(self, row: live.LiveTakeRecord) -> None:
-        self.room(row.session_id).say("state", msgspec.json.encode(describe_unjoined(row)))
+        self.room(row.session_id).say("state", encode_json(describe_unjoined(row)))
         self.leave(row.session_id)
 
     async def _tick(self) -> None:
@@ -371,7 +371,7 @@ class Hub:
             try:
                 await self._mind_once()
             except SQLAlchemyError:
-                continue  # the database is away: nothing is known, everything goes on
+                continue  # the database is unavailable: continue without changes
             except Exception:
                 log.exception("whose the live takes are could not be looked up; trying again")
 
@@ -400,4 +400,4 @@ class Hub:
 
 
 def _notify(take: ActiveTake, severity: str, text: str) -> None:
-    take.room.say("notice", msgspec.json.encode({"type": "notice", "severity": severity, "text": text}))
+    take.room.say("notice", encode_json({"type": "notice", "severity": severity, "text": text}))

@@ -26,6 +26,8 @@ from sagittal.core.formats.live_log import (
     read_batch_header,
     view_samples,
 )
+from sagittal.core.message import Message
+from sagittal.core.plurals import plural
 from sagittal.server.live import protocol
 from sagittal.server.live.protocol import MOST_UNACKED, CloseCode, ProtocolError
 
@@ -93,8 +95,8 @@ class Intake:
         self.next_seq = 0
         self.durable = 0
         self._hash = hashlib.sha256()
-        self._said: Finish | None = None  # the end, as the tablet or this side said it
-        self._base = 0  # batches that were there when the log was opened
+        self._said: Finish | None = None  # the end as declared by the tablet or this side
+        self._base = 0  # batches in the log when it was opened
         self._end_durable = False
         self._spans: dict[int, _Span] = {}
 
@@ -126,13 +128,18 @@ class Intake:
         InputError `live_log_order` if it is not a log of ours.
         """
         if (self.hello is None) != (record.kind == "H") or self._said is not None:
-            raise InputError("live_log_order", f"The log has a record '{record.kind}' out of its order.")
+            raise InputError(
+                "live_log_order", Message("The log has a record '{kind}' out of its order.", kind=record.kind)
+            )
         if record.kind == "H":
             self.hello = parse_hello(record.body)
         elif record.kind == "B":
             header = read_batch_header(record.body)
             if header.seq != self.next_seq:
-                raise InputError("live_log_order", f"Batch {header.seq} follows {self.next_seq - 1}.")
+                raise InputError(
+                    "live_log_order",
+                    Message("Batch {seq} follows {next_seq}.", seq=header.seq, next_seq=self.next_seq - 1),
+                )
             self._take(record.body, header)
             self.durable = self._base = self.next_seq
         else:
@@ -151,8 +158,8 @@ class Intake:
                     "to record with other sensors.",
                 )
             )
-        # not `next_seq`: whoever takes a welcome for an acknowledgement must not be wrong; what is sent
-        # twice for it is a duplicate
+        # not `next_seq`: a client that takes the welcome for an acknowledgement must still be correct;
+        # batches sent twice for it are duplicates
         return IntakeAnswer(protocol.welcome(self.durable))
 
     def offer(self, message: bytes | str) -> IntakeAnswer:
@@ -225,8 +232,12 @@ class Intake:
             return IntakeAnswer(
                 protocol.error(
                     MISMATCH,
-                    f"The tablet counts {finish.count} batches, {self.next_seq} have come; send the rest and "
-                    "finish again.",
+                    Message(
+                        f"The tablet counts {{count}} {plural(finish.count, 'batch', 'batches')}, "
+                        "{next_seq} have come; send the rest and finish again.",
+                        count=finish.count,
+                        next_seq=self.next_seq,
+                    ),
                     next_seq=self.next_seq,
                 )
             )

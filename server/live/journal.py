@@ -23,7 +23,7 @@ from sagittal.server.storage.schema.tables import now
 log = logging.getLogger(__name__)
 
 INTERVAL_S: Final = 0.5
-"""Rows wait so long for others; with the transaction itself they are written within a second."""
+"""Rows wait this long for others; including the transaction they are written within a second."""
 
 
 class Journal:

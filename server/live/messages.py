@@ -13,10 +13,10 @@ import msgspec
 from sagittal.core.user_text import encode_user_text
 
 STALE_S: Final = 0.5
-"""Data older than this are not fed back (docs/science/feedback.md, "Which strides get a cue")."""
+"""Older data are not used for feedback (docs/science/feedback.md, "Which strides get a cue")."""
 
 BATTERY_WARN_PCT: Final = 15.0
-"""Our choice: a DOT streams 6 h, so there is about an hour left."""
+"""Our choice: a DOT streams for 6 h, so about one hour is left."""
 
 Kind = Literal["stride", "cue", "calibration", "guard", "notice"]
 
@@ -145,5 +145,6 @@ Order = FollowTake | LogGrown | Command | Charge | ForgetTake
 Report = EstimatorReady | Picture | FeedItem | FeedbackStatus | LogProcessed | EstimateFailed
 
 encode = partial(msgspec.msgpack.encode, enc_hook=encode_user_text)
+encode_json = partial(msgspec.json.encode, enc_hook=encode_user_text)
 decode_order = msgspec.msgpack.Decoder(Order).decode
 decode_report = msgspec.msgpack.Decoder(Report).decode

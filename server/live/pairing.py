@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from sagittal.core.formats.json_tree import read_json
+from sagittal.core.message import Message
 from sagittal.server.live.sender import LiveError
 
 
@@ -41,7 +42,7 @@ def pair(address: str, code: str) -> PairingResult:
         data=json.dumps({"code": code}).encode(),
         headers={"Content-Type": "application/json"},
     )
-    # no proxy of the environment: a server on loopback is not its business
+    # ignore the environment's proxy, which does not apply to a loopback server
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     try:
         with opener.open(request, timeout=20) as answer:
@@ -70,4 +71,6 @@ def _refusal(refused: urllib.error.HTTPError) -> LiveError:
         problem: Any = read_json(refused.read())
         return LiveError(str(problem["code"]), str(problem["detail"]))
     except (ValueError, KeyError, TypeError):
-        return LiveError("unreachable", f"The server answered HTTP {refused.code}; is it Sagittal?")
+        return LiveError(
+            "unreachable", Message("The server answered HTTP {code}; is it Sagittal?", code=refused.code)
+        )

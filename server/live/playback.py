@@ -25,11 +25,12 @@ from sagittal.core.formats.live_log import (
     encode_batch,
 )
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.signals.rest import find_runs
 
 ON_GRID: Final = 0.01
-"""Largest distance from the grid in samples, as core/timeline takes it."""
+"""Maximum distance from the grid in samples, as in core/timeline."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,14 @@ def cut(recording: Recording, per_batch: int) -> list[DueBatch]:
     InputError `batch_size`.
     """
     if not 1 <= per_batch <= MOST_SAMPLES:
-        raise InputError("batch_size", f"{per_batch} samples per batch; choose 1 to {MOST_SAMPLES}.")
+        raise InputError(
+            "batch_size",
+            Message(
+                "{per_batch} samples per batch; choose 1 to {MOST_SAMPLES}.",
+                per_batch=per_batch,
+                MOST_SAMPLES=MOST_SAMPLES,
+            ),
+        )
     grids = _grids(recording)
     begin_s = min(s.t_s[0] for grid in grids for _, s in grid.sensors)
     pieces = sorted(

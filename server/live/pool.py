@@ -27,10 +27,10 @@ from sagittal.server.processes.kept_process import KeptProcess
 from sagittal.server.settings import Settings
 
 BACKLOG_BYTES: Final = 1 << 16
-"""While so much waits for a process to read it, it is told no further lengths."""
+"""With a larger backlog, a process receives no further sizes."""
 LOOK_S: Final = 1.0
 MODULE: Final = "sagittal.server.live.estimator"
-"""What an estimator process runs."""
+"""Module of an estimator process."""
 
 
 class EstimatorPool:
@@ -125,7 +125,7 @@ class EstimatorPool:
             for worker in self._workers:
                 worker.look()
 
-    # what a worker tells
+    # messages of a worker
 
     def handle_message(self, report: Report) -> None:
         """Callback of a worker for each report."""
@@ -159,7 +159,7 @@ class _Estimator:
         self._flushing = False
 
     def send(self, order: Order) -> None:
-        # what is sent before a process is there is in the Begin it will get
+        # messages sent before a process exists are included in its Begin
         if not self.process.is_connected:
             return
         self._flush()
@@ -169,7 +169,7 @@ class _Estimator:
         self._sizes[take] = size
         self._at = time.monotonic()
         if not self._flushing:
-            # once per turn of the loop, for all takes that grew in it
+            # once per turn of the loop, for all trials with new data
             self._flushing = True
             asyncio.get_running_loop().call_soon(self._flush)
 

@@ -22,13 +22,14 @@ from sagittal.core.formats.live_log import (
     finish_of,
     hello_of,
 )
+from sagittal.core.message import Message
 
 MAX_UNACKED: Final = 64
-"""Batches a tablet may have sent beyond the last acknowledgement; then it waits."""
+"""Unacknowledged batches after which a tablet must wait."""
 MOST_UNACKED: Final = 2 * MAX_UNACKED
-"""One that has sent so many does not listen to acknowledgements and is closed."""
+"""A tablet with more unacknowledged batches is disconnected."""
 HELLO_WITHIN_S: Final = 10.0
-"""Time a socket has to say hello."""
+"""Time limit for the hello of a socket."""
 MOST_MESSAGE_BYTES: Final = MOST_FRAME_BYTES
 
 
@@ -51,7 +52,7 @@ class CloseCode(IntEnum):
 FINAL: Final = frozenset(
     {CloseCode.TOO_BIG, CloseCode.MALFORMED, CloseCode.UNAUTHORISED, CloseCode.ENDED, CloseCode.REPLACED}
 )
-"""A client that is closed so does not come back with the same messages; after any other it resumes."""
+"""Close codes after which a client must not reconnect with the same messages; after others it resumes."""
 
 
 class ProtocolError(InputError):
@@ -73,7 +74,7 @@ class Battery:
 
 
 Said = Hello | SampleBatch | Finish | Battery
-"""A text message of the tablet."""
+"""A text message from the tablet."""
 
 
 def parse(text: str) -> Said:
@@ -131,7 +132,14 @@ def _battery(root: Mapping[str, Any]) -> Battery:
         raise InputError("battery_bad", "A battery message has no `sensors`; expected {id: percent}.")
     for name, value in sensors.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value <= 100:
-            raise InputError("battery_bad", f"The battery of {name:.40} is {value!r:.40}; expected 0 to 100.")
+            raise InputError(
+                "battery_bad",
+                Message(
+                    "The battery of {name:.40} is {value:.40}; expected 0 to 100.",
+                    name=name,
+                    value=repr(value),
+                ),
+            )
     return Battery({name: float(value) for name, value in sensors.items()})
 
 

@@ -17,12 +17,13 @@ import msgspec
 from sagittal.server.live.messages import Picture
 
 QUEUE: Final = 200
-"""Strides, cues and notices kept for a browser that does not read: two minutes of walking."""
+"""Strides, cues and notices queued for a browser that does not read: two minutes of walking."""
 KEPT: Final = 60
-"""Strides and cues that a new browser gets, as many as one that was there holds (web/static/js/live/feed.js):
-the page's strip has the last 20 of a side that is trained alone, some of which do not count."""
+"""Strides and cues sent to a new browser, as many as a connected one holds (web/static/js/live/feed.js): the
+page's strip shows the last 20 of a trained side, some of which may be excluded.
+"""
 STATES: Final = ("state", "feedback", "frame")
-"""Kinds of which only the newest counts, in the order in which a new browser gets them."""
+"""Kinds of which only the latest is sent, in the order for a new browser."""
 
 
 class StrideNumber(msgspec.Struct, frozen=True):

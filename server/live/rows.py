@@ -26,7 +26,7 @@ class Rows:
     def claim(self, row: live.LiveTakeRecord, owner: live.TakeOwner) -> live.LiveTakeRecord:
         """Take ownership of a trial; raises NodeAway, NotFound."""
         if owner.node is None and row.node is None:
-            return row  # one server alone: nothing to write
+            return row  # single server: nothing to write
         with self._db.write() as c:
             return claim_take(c, row.id, owner)
 

@@ -72,7 +72,7 @@ class StreamReport:
 
 
 def _over(ws: ClientConnection, sending: asyncio.Task[None]) -> None:
-    if not sending.cancelled():  # dropped on purpose, or the source failed
+    if not sending.cancelled():  # dropped deliberately, or the source failed
         ws.transport.abort()
 
 
@@ -100,7 +100,7 @@ class Sender:
         self._most = 0
         self._welcome = False
         self._finish_sent = False  # on this connection
-        self._finish_said = False  # on any
+        self._finish_said = False  # on any connection
         self._connections = 0
         self._hash = hashlib.sha256()
         self._changed = asyncio.Event()
@@ -124,7 +124,7 @@ class Sender:
         async for frame in frames:
             self._hash.update(view_samples(frame, read_batch_header(frame)))
             if not self._kept:
-                self.progressed_at = time.monotonic()  # nothing could be acknowledged before
+                self.progressed_at = time.monotonic()  # nothing to acknowledge before
             self._kept.append(frame)
             self._changed.set()
         self.report.sha256 = self._hash.hexdigest()
@@ -165,7 +165,7 @@ class Sender:
             self._changed.clear()
 
     async def _send_one(self, ws: ClientConnection) -> None:
-        # while this waits (a jitter, a full socket), acknowledgements may move the window
+        # during this wait (jitter, full socket), acknowledgements may move the window
         place = self._at - self._acked
         if place < 0:
             self._at = self._acked
@@ -193,7 +193,7 @@ class Sender:
                 if message.get("code") == "finish_mismatch" and "next_seq" in message:
                     self._at, self._finish_sent = max(int(message["next_seq"]), self._acked), False
                 else:
-                    self._most = 0  # nothing more is taken on this connection
+                    self._most = 0  # nothing more is sent on this connection
             case _:
                 self._hear(message)
         self._changed.set()

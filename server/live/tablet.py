@@ -30,7 +30,7 @@ from sagittal.server.nodes.passage import ASKED_BY
 router = APIRouter(include_in_schema=False)
 
 UNREAD: Final = 256
-"""Messages a tablet may leave unread, acknowledgements not counted; it has gone then."""
+"""Unread messages, not counting acknowledgements, after which a tablet is considered disconnected."""
 
 
 class Tablet:
@@ -98,7 +98,7 @@ async def stream(ws: WebSocket) -> None:
     finally:
         if not sending.done():
             sending.cancel()
-        # the tablet may be gone already
+        # the tablet may have disconnected
         await asyncio.gather(sending, return_exceptions=True)
 
 
@@ -136,7 +136,7 @@ async def _greeted(ws: WebSocket, hub: Hub, tablet: Tablet) -> ActiveTake | None
         )
     except ProtocolError as error:
         _refuse(tablet, error)
-    except NotFound:  # erased since
+    except NotFound:  # erased in the meantime
         _refuse(tablet, _not_valid())
     except NodeAway as error:
         _refuse(tablet, ProtocolError(error.code, error.message, CloseCode.GOING_AWAY))
@@ -172,7 +172,7 @@ async def _receive(ws: WebSocket, take: ActiveTake, tablet: Tablet) -> None:
         answer = take.offer(message)
         _heed(tablet, take, answer)
         if answer.close is not None:
-            # what still comes is not answered any more; the sender closes
+            # later messages are not answered; the sender closes
             with contextlib.suppress(WebSocketDisconnect):
                 while await _message(ws) is not None:
                     pass

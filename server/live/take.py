@@ -28,9 +28,9 @@ from sagittal.server.live_takes.live_events import LiveEvent, is_own_notice
 from sagittal.server.live_takes.live_training import LiveTraining
 
 STEERING: Final = frozenset({"feedback", "level", "pause", "stale", "redo_calibration", "test"})
-"""Commands that change what the estimator says; each holds from a batch on."""
+"""Commands that affect the estimator, effective from a given batch."""
 TOLD: Final = frozenset({"cue", "calibration", "guard", "notice"})
-"""Kinds of items that become events."""
+"""Kinds of items stored as events."""
 
 
 class TabletLink(Protocol):
@@ -141,7 +141,8 @@ class ActiveTake:
         self.steered = TakeSteering()
         for event in earlier:
             self.steered.note_event(self.id, event.kind, event.t_s, event.content)
-            if event.kind in TOLD and not is_own_notice(event.content):  # those are no item of the estimator
+            # these do not come from the estimator
+            if event.kind in TOLD and not is_own_notice(event.content):
                 self._seen[event.kind] += 1
         self.grown_at = time.monotonic()
         self._size = 0

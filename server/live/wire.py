@@ -6,7 +6,6 @@ Runs in the estimator process; the web process forwards the bytes.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from math import isfinite, pi
 from typing import Any, Final
 
@@ -18,27 +17,27 @@ from sagittal.core.errors import Notice
 from sagittal.core.feedback import Cue, FeedbackState
 from sagittal.core.frames import SIDES, SUFFIX, Floats, Side
 from sagittal.core.functional_tests.result import GuidedTestView, TimedSegment
+from sagittal.core.message import Message
 from sagittal.core.online.frame import AngleTrail, CalibrationView, LiveFrame, SensorHealth
 from sagittal.core.parameters.live.live_stride import LiveStride
 from sagittal.core.parameters.result import Parameter
-from sagittal.core.user_text import encode_user_text
-from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose
+from sagittal.server.live.messages import BATTERY_WARN_PCT, STALE_S, FigurePose, encode_json
 from sagittal.server.report.view.calibration_checks import say_verdict
 from sagittal.server.report.view.functional import segment_label
 from sagittal.server.report.words.guided_words import tell_person
 from sagittal.server.report.words.wording import place_words, reason_words, speak_places
 
 LOST_WARN, LOST_BAD = 0.01, 0.20
-"""Shares of lost samples, as the report judges a whole take (core/quality/assessment.py)."""
+"""Fractions of lost samples, as in the assessment of a whole trial (core/quality/assessment.py)."""
 SATURATED_WARN: Final = 0.001
-"""Share of samples at range, as there."""
+"""Fraction of samples at full scale, likewise."""
 DOUBTS: Final[Mapping[str, tuple[str, str]]] = {
     "sensors_exchanged": ("bad", "exchanged"),
     "sensor_slipped": ("bad", "slipped"),
     "sensor_late": ("warn", "late"),
     "clocks_disagree": ("warn", "clock in doubt"),
 }
-"""What the other sensors say of one (core/agreement/live.py) → its state and words."""
+"""Inconsistency with the other sensors (core/agreement/live.py) → state and words."""
 TEST_PROBLEMS: Final[Mapping[str, str]] = {
     "segments_missing": (
         "This test requires a sensor on the pelvis or chest or, for walking tests, on both feet."
@@ -46,14 +45,12 @@ TEST_PROBLEMS: Final[Mapping[str, str]] = {
     "stepped": "The person moved. Stand still again; the time restarts.",
     "trial_too_long": "No end detected within three minutes. Start over.",
 }
-"""Why a guided test began anew, or cannot begin (core/functional_tests/guided.py)."""
+"""Why a guided test was restarted or cannot start (core/functional_tests/guided.py)."""
 CURVE_POINTS: Final = 51
-"""Every second of the 101 points of a cycle: a chart on a tablet shows no more."""
+"""Every second of the 101 points of a cycle, which suffices for a chart on a tablet."""
 
 _SEVERITY: Final = {"info": "info", "warning": "warn", "error": "bad"}
 _DEGREES: Final = 180.0 / pi
-
-encode = partial(msgspec.json.encode, enc_hook=encode_user_text)
 
 
 def frame(
@@ -80,7 +77,7 @@ def frame(
         "contact": {SUFFIX[side]: bool(live_frame.contact.get(side, False)) for side in SIDES},
         **slow,
     }
-    return encode(body)[:-1]
+    return encode_json(body)[:-1]
 
 
 def slow_part(
@@ -97,15 +94,15 @@ def slow_part(
     """
     health = [_health(row, battery.get(row.id)) for row in live_frame.health]
     return {
-        "test": msgspec.Raw(encode(None if guided is None else tell_test(guided))),
+        "test": msgspec.Raw(encode_json(None if guided is None else tell_test(guided))),
         "calibration": calibration or describe_calibration(live_frame.calibration),
-        "health": msgspec.Raw(encode(health)),
+        "health": msgspec.Raw(encode_json(health)),
     }
 
 
 def describe_calibration(view: CalibrationView | None) -> msgspec.Raw:
     """State of the calibration."""
-    return msgspec.Raw(encode(_calibration(view)))
+    return msgspec.Raw(encode_json(_calibration(view)))
 
 
 def tell_test(view: GuidedTestView) -> dict[str, Any]:
@@ -279,7 +276,9 @@ def _judged(row: SensorHealth, battery_pct: float | None) -> tuple[str, str]:
     if row.segment is None:
         return "none", "not used"
     if row.silent_s > STALE_S:
-        return "bad", f"silent for {row.silent_s:.0f} s" if row.silent_s >= 1.0 else "silent"
+        return "bad", Message(
+            "silent for {silent_s:.0f} s", silent_s=row.silent_s
+        ) if row.silent_s >= 1.0 else "silent"
     if row.stuck:
         return "bad", "no valid data"
     if row.lost_share > LOST_BAD:
@@ -299,7 +298,7 @@ def _trace(trail: Iterable[AngleTrail]) -> dict[str, list[float | None]]:
     pieces = [piece for piece in trail if len(piece.t_s)]
     if not pieces:
         return {"t": []}
-    # a new calibration may change the names: what was before is another curve
+    # a new calibration may change the set of angles: earlier curves no longer match
     names = pieces[-1].names
     pieces = [piece for piece in pieces if piece.names == names]
     values = np.concatenate([piece.values for piece in pieces]).T * _DEGREES

@@ -22,6 +22,7 @@ from typing import Any, Final
 from sagittal.core.formats.json_tree import read_json
 from sagittal.core.formats.live_log import LATEST_US, MOST_FRAME_BYTES, LogRecord, record
 from sagittal.core.formats.live_reader import find_start_us
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.live_takes import live, live_recordings
@@ -35,7 +36,7 @@ from sagittal.server.uploads import receiving, recordings, videos
 log = logging.getLogger(__name__)
 
 MOST_PIECE_BYTES: Final = MOST_FRAME_BYTES
-"""Of one piece: one or two seconds of a film have a quarter of it."""
+"""Maximum size of a chunk; one or two seconds of video take a quarter of it."""
 
 
 class TokenNotValid(ServiceError):  # noqa: N818 - what the person reads
@@ -124,7 +125,14 @@ class FilmIntake:
             if film is None:
                 raise NotFound("video of trial", take_id)
             if number > film.pieces:
-                raise Conflict("film_gap", f"Piece {number} came, expected {film.pieces}. Send that first.")
+                raise Conflict(
+                    "film_gap",
+                    Message(
+                        "Piece {number} came, expected {pieces}. Send that first.",
+                        number=number,
+                        pieces=film.pieces,
+                    ),
+                )
             if number == film.pieces and piece:
                 self._append(film, piece)
             return self._say(film)
@@ -171,7 +179,7 @@ class FilmIntake:
             sizes: list[int] = []
             opened = segments.recover(path, lambda one: sizes.append(len(one.body)))
             if opened is not None:
-                # the head is no piece
+                # the header is not a chunk
                 film = _OpenFilm(opened, len(sizes) - 1, sum(sizes[1:]))
                 self._open[take_id] = film
         return film
@@ -181,7 +189,10 @@ class FilmIntake:
         if film.size + len(piece) > limit:
             raise TooLarge(
                 "file_too_large",
-                f"A video may have at most {limit / 1000000.0:g} MB here and is stopped before that.",
+                Message(
+                    "A video may have at most {limit:g} MB here and is stopped before that.",
+                    limit=limit / 1e6,
+                ),
             )
         receiving.require_room(self._blobs, self._settings, len(piece))
         try:
@@ -234,7 +245,7 @@ def settle(db: Database, blobs: BlobStore, settings: Settings, path: Path) -> bo
             with db.write() as c:
                 audit.record(c, None, "video.discarded", "session", take.session_id, {"take_id": take_id})
     except NotFound:
-        attached = False  # erased meanwhile
+        attached = False  # erased in the meantime
     fs.remove_file(path)
     return attached
 
@@ -278,7 +289,7 @@ def _keep(
         try:
             film.keep()
         except NotFound:
-            # erased meanwhile: nothing of it may wait in the trash
+            # erased in the meantime: nothing of it may remain in the trash
             references.discard(db, blobs, take.patient_id, [content.hexdigest()])
             raise
     return True

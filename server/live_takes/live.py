@@ -27,7 +27,7 @@ from sagittal.server.storage.schema.live_tables import OPEN_TAKE_STATES, live_ta
 from sagittal.server.storage.schema.tables import new_id, now, patient, session
 
 ALPHABET = "23456789ABCDEFGHJKMNPQRSTUVWXYZ"
-"""Characters of a code: none that looks or sounds on a tablet like another (0 O, 1 I L)."""
+"""Characters of a code, without those easily confused when read or heard (0 O, 1 I L)."""
 CODE_LENGTH = 6
 """31⁶ = 9 · 10⁸ codes, ten failures per address in a quarter of an hour (server/auth/throttle.py)."""
 CODE_LIFE = dt.timedelta(minutes=10)
@@ -101,7 +101,7 @@ class TabletAccess:
     session_title: str
     patient_code: str
     remembered: Mapping[str, str]
-    """Serial number → segment it was worn on last."""
+    """Serial number → last segment."""
 
 
 def open_take(

@@ -10,6 +10,7 @@ from typing import Any, Final
 from sqlalchemy import Connection, bindparam, insert, select
 
 from sagittal.core.errors import ParameterError
+from sagittal.core.message import Message
 from sagittal.core.signals.recording import GivenLimits
 from sagittal.server import audit
 from sagittal.server.errors import ServiceError
@@ -17,12 +18,12 @@ from sagittal.server.storage.schema.live_tables import live_event, live_take
 from sagittal.server.storage.schema.tables import now, user
 
 DAMAGED = "live_log_damaged"
-"""Code of the notice that a part of a take's log could not be read back."""
+"""Code of the notice that part of a trial's log could not be read."""
 
 COMMANDS = (
     "start", "stop", "mark", "undo_mark", "feedback", "level", "pause", "redo_calibration", "ghost", "test",
 )  # fmt: skip
-"""What a therapist may do in a running take; each is kept as an event."""
+"""Commands of a therapist in a running trial, stored as events."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,10 @@ def check_value(name: str, value: object) -> None:
     else:
         ok, expected = value is None, "nothing"
     if not ok:
-        raise ServiceError("bad_value", f"The value of the command {name} is not {expected}.")
+        raise ServiceError(
+            "bad_value",
+            Message("The value of the command {name} is not {expected}.", name=name, expected=expected),
+        )
 
 
 def _are_limits(value: object) -> bool:

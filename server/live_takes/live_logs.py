@@ -16,6 +16,7 @@ from sqlalchemy import Connection, insert, select
 
 from sagittal.core.errors import InputError
 from sagittal.core.formats.live_log import parse_hello, read_batch_header
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -129,11 +130,16 @@ def adopt(
         raise NotFound("live log", take_id)
     log = read_log(path, is_known=False)
     if not log.batches:
-        raise Conflict("take_empty", f"{path.name} has no readable sample; it was left unchanged.")
+        raise Conflict(
+            "take_empty",
+            Message("{name} has no readable sample; it was left unchanged.", name=path.name),
+        )
     with db.write() as c:
         sessions.get(c, session_id)
         if c.execute(select(live_take.c.id).where(live_take.c.id == take_id)).first():
-            raise Conflict("take_known", f"Recording {take_id} already belongs to a visit.")
+            raise Conflict(
+                "take_known", Message("Recording {take_id} already belongs to a visit.", take_id=take_id)
+            )
         c.execute(
             insert(live_take).values(
                 id=take_id,

@@ -102,7 +102,7 @@ def repair(db: Database, blobs: BlobStore, settings: Settings, queue: JobQueue) 
             keep(db, blobs, queue, path)
             fs.remove_file(path)
         except Exception:
-            # one take that cannot be stored must not keep the clinic closed; its log stays for the next start
+            # a trial that cannot be stored must not prevent startup; its log remains for the next start
             log.exception("live take %s could not be stored", path.stem)
     return waiting
 
@@ -116,7 +116,7 @@ def _take_in(db: Database, settings: Settings) -> None:
     if settings.node_name:
         left = [one for one in left if one.parent == settings.data_dir]
     if any(any(folder.iterdir()) for folder in left):
-        # two servers that start at once: the second finds nothing
+        # if two servers start at once, the second finds nothing
         with db.write():
             for folder in left:
                 for path in sorted(folder.iterdir()):
@@ -146,7 +146,7 @@ def _store(
         with db.write() as c:
             return _publish(c, blobs, queue, take.id, blob, hello)
     except NotFound:
-        # erased meanwhile: nothing of it may wait in the trash
+        # erased in the meantime: nothing of it may remain in the trash
         references.discard(db, blobs, take.patient_id, [blob.sha256])
         raise
 
@@ -164,7 +164,7 @@ def _set_aside(db: Database, take_id: str, path: Path) -> None:
             live.get(c, take_id)
             live_events.add_event(c, None, take_id, "notice", None, notice)
     except NotFound:
-        fs.remove_file(original)  # erased meanwhile
+        fs.remove_file(original)  # erased in the meantime
         raise
 
 
@@ -205,7 +205,7 @@ def _publish(
     if (limits := live_events.read_test_limits(c, take_id)) is not None:
         declared["test_limits"] = limits
     manifest = analyses.complete_manifest(c, take.session_id, declared)
-    # alone in its set: files that were uploaded to this session before are another take
+    # alone in its set: files uploaded to this session earlier belong to another trial
     c.execute(
         insert(recording).values(
             id=recording_id, session_id=take.session_id, manifest=manifest, created_at=time

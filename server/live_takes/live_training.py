@@ -90,7 +90,7 @@ def _prescribed(c: Connection, reviewed: ReviewedAnalyses, take: live.LiveTakeRe
         written = prescriptions.in_force(c, take.patient_id)
         prescribed = prescriptions.for_take(c, reviewed, take.session_id)
     except SagittalError:
-        # an earlier visit that cannot be read must not keep this one from being recorded
+        # an unreadable earlier visit must not prevent this recording
         log.exception("live take %s begins without feedback", take.id)
         return nothing
     if written is None or prescribed is None or not prescribed[0].target.resolved:

@@ -20,6 +20,7 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import InvalidStatus, WebSocketException
 
+from sagittal.core.message import Message
 from sagittal.server.http.carrying import carry_messages
 from sagittal.server.http.problems import Problem, send_problem
 from sagittal.server.nodes import passage
@@ -29,16 +30,16 @@ from sagittal.server.nodes.registry import Nodes, WebNode
 log = logging.getLogger(__name__)
 
 CONNECT_S: Final = 3.0
-"""A server on the same network that does not answer by then is away."""
+"""Time limit for connecting to a server on the same network."""
 ANSWER_S: Final = 90.0
-"""Longest wait for an answer; the end of a take may wait for the disk."""
+"""Time limit for a response; ending a trial may wait for the disk."""
 _PIECE: Final = 1 << 16
 _HOPS: Final = frozenset(
     b"connection keep-alive proxy-authenticate proxy-authorization proxy-connection te trailer "
     b"transfer-encoding upgrade expect accept-encoding content-length forwarded x-forwarded-for "
     b"x-forwarded-proto x-forwarded-host x-real-ip date server x-sagittal-node".split()
 )
-"""Headers of one connection, or of ours alone; compression is for the browser's own line."""
+"""Hop-by-hop headers, and our own; compression is for the browser's connection."""
 
 
 class UnreachableError(Exception):
@@ -99,8 +100,11 @@ async def _pass_request(nodes: Nodes, node: WebNode, scope: Scope, receive: Rece
             problem = Problem(
                 503,
                 "node_lost",
-                f"The web server '{node.name}' did not respond. Check whether the request was carried out "
-                "before trying again.",
+                Message(
+                    "The web server '{name}' did not respond. Check whether the request was carried "
+                    "out before trying again.",
+                    name=node.name,
+                ),
                 headers={"Retry-After": "5"},
             )
             await send_problem(problem, scope, receive, send)
@@ -160,7 +164,7 @@ async def open_line(node: WebNode, ws: WebSocket, line: bytes) -> AsyncIterator[
     try:
         up = await connect(
             f"{scheme}://{host}{_target(ws.scope).decode('latin-1')}",
-            # the name is the one that the client asked for, the place is the other server's
+            # the Host as requested by the client, the connection to the other server
             host=url.hostname,
             port=url.port,
             additional_headers=headers,
@@ -200,7 +204,7 @@ async def _ask(
             content += event.data
         elif isinstance(event, h11.EndOfMessage) and head is not None:
             answer = Response(bytes(content), head.status_code)
-            # the body of an answer to HEAD is not there, its length is said all the same
+            # the response to HEAD has no body but states its length
             answer.raw_headers = [
                 (name, value)
                 for name, value in head.headers

@@ -19,11 +19,11 @@ from sagittal.server.storage import fs
 
 HEADER: Final = b"x-sagittal-node"
 ASKED_BY: Final = "sagittal.asked_by"
-"""Key of a scope: the name of the server that has passed the request on."""
+"""Scope key: name of the server that forwarded the request."""
 LIFE_S: Final = 60.0
-"""How old a line may be; the clocks of all servers agree better than that."""
+"""Maximum age of a header; the servers' clocks are better synchronized."""
 _BOUND: Final = frozenset({b"host", b"cookie", b"authorization", b"origin"})
-"""Headers that the HMAC covers."""
+"""Headers covered by the HMAC."""
 
 Headers = Iterable[tuple[bytes, bytes]]
 

@@ -29,7 +29,7 @@ from sagittal.server.storage.schema.node_tables import web_node
 from sagittal.server.storage.schema.tables import now
 
 FORGOTTEN: Final = dt.timedelta(days=30)
-"""A server that was not heard of for so long is not listed any more."""
+"""Servers without a heartbeat for this long are no longer listed."""
 
 log = logging.getLogger(__name__)
 

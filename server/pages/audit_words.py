@@ -155,7 +155,7 @@ DEEDS: Final[Mapping[str, str]] = {
     "backup.restored": "restored a backup",
     "database.accepted": "accepted this database as the clinic's own",
 }
-"""Action → what was done, to follow the name of who did it."""
+"""Action → description that follows the user's name."""
 
 SIGNED_IN_BY: Final[Mapping[str, str]] = {
     "password": "signed in with password only",
@@ -163,7 +163,7 @@ SIGNED_IN_BY: Final[Mapping[str, str]] = {
     "recovery_code": "signed in with password and recovery code",
     "security_key": "signed in with password and security key",
 }
-"""Factor of a sign-in (`accounts.Factor`) → what was done; rows from before say none."""
+"""Factor of a sign-in (`accounts.Factor`) → description; older rows have none."""
 
 NOBODY: Final = "The system"
 STRANGER: Final = "Someone"

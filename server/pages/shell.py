@@ -21,11 +21,11 @@ NAVIGATION = (
     ("audit", "audit", "Audit", "/audit", Action.READ_AUDIT),
     ("system", "gear", "System", "/system", Action.READ_SYSTEM),
 )
-"""Rail entries: page, icon, word, address, and what one must be allowed to do to see it."""
+"""Navigation entries: page, icon, label, URL, and required action."""
 
 
 FRAGMENT = "x-sagittal-fragment"
-"""Header by which a page's own script asks for a part of it."""
+"""Header with which a page's own script requests part of it."""
 
 
 def record_opening(request: Request, user: Identity, resource: str, resource_id: str) -> None:

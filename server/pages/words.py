@@ -60,7 +60,7 @@ CALIBRATIONS: Final = (
         ),
     ),
 )
-"""Ways to calibrate: name of the drawing, title, what to do. The analysis finds by itself which was done."""
+"""Calibration methods: name of the drawing, title, instruction. The analysis detects which was used."""
 
 TEST_PROTOCOLS: Final = (
     (

@@ -24,11 +24,12 @@ from sagittal.server.processes.lifeline import call_when_parent_ends, die_with
 from sagittal.server.settings import Settings, load_settings
 
 BEHIND: Final = 5
-"""Added to the niceness of a worker, and again to that of who computes for it: pages and live takes have the
-processor first, then leases. Not more: on a machine that is busy with other things jobs must get on."""
+"""Increment of the nice value for workers, and again for their compute processes, so that pages and live
+trials have priority, then leases. No more, since jobs must progress on a busy machine.
+"""
 BOUND: Final = "sagittal.server.processes.bound"
 FAR_BEHIND: Final = 2 * BEHIND
-"""Of a process beside the web server that computes for long."""
+"""Increment for long computations started by the web server."""
 
 
 def start_child(
@@ -91,7 +92,7 @@ def enter_child() -> tuple[Channel, Settings]:
     """
     end = socket.socket(fileno=int(sys.argv[1]))
     die_with(int(sys.argv[2]))
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent ends us
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; the parent ends us
     call_when_parent_ends(lambda: os._exit(1))
     settings = load_settings()
     start_log(settings)

@@ -14,7 +14,7 @@ import sagittal
 from sagittal.server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 Order = tuple[tuple[str, str], ...]
-"""Modules and their functions that compile something, in order."""
+"""Modules and their functions that compile filters, in order."""
 
 OFFLINE: Final[tuple[Order, Order]] = (
     (("sagittal.core.body.estimate", "compile_erkf_kernels"),),
@@ -30,7 +30,7 @@ OFFLINE: Final[tuple[Order, Order]] = (
         ("sagittal.core.events", "compile_foot_way_kernel"),
     ),
 )
-"""What each of two processes compiles for the analysis of a walk: the ErKF takes as long as all others."""
+"""Filters for the analysis of a walk, divided over two processes: the ErKF takes as long as all others."""
 
 ALL: Final[tuple[Order, Order]] = (
     (*OFFLINE[0], ("sagittal.core.online.session", "compile_live_kernels")),
@@ -40,8 +40,9 @@ ALL: Final[tuple[Order, Order]] = (
         *OFFLINE[1],
     ),
 )
-"""The same with those of few sensors and of live takes, which read from the folder what is done meanwhile: so
-what live takes ask for first comes first."""
+"""Likewise with those for few sensors and live trials, which load shared ones from the folder: hence first
+what live trials need first.
+"""
 
 
 def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
@@ -52,14 +53,14 @@ def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
     subprocess.CalledProcessError
         a filter does not compile.
     """
-    # where the package lies, whether it is installed or not
+    # location of the package, installed or not
     root = str(Path(sagittal.__file__).parent.parent)
     searched = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
     running = [
         subprocess.Popen(  # noqa: S603 - our own modules, named above
             [sys.executable, "-c", _write_script(order)],
             env={**os.environ, "PYTHONPATH": searched},
-            stdin=subprocess.PIPE,  # closed by our end, also by a kill: nobody would wait for it
+            stdin=subprocess.PIPE,  # closed with our end, even when killed, so that nobody waits for it
         )
         for order in orders
     ]
@@ -73,8 +74,8 @@ def compile_filters(orders: tuple[Order, Order] = ALL) -> None:
 
 
 def _write_script(order: Order) -> str:
-    # a compiler makes little garbage and much else: looking for it takes a sixth of the time, and without it
-    # such a process has 470 MB instead of 350 in the end
+    # a compiler produces little garbage among many objects: collection takes a sixth of the time; without it
+    # such a process ends with 470 MB instead of 350
     lines = [
         "import gc, os; gc.disable()",
         "from sagittal.server.processes.lifeline import call_when_parent_ends",
@@ -92,7 +93,7 @@ def compile_filters_once(orders: tuple[Order, Order] = ALL) -> None:
     folder = Path(os.environ[VARIABLE])
     with suppress(OSError, subprocess.CalledProcessError):
         folder.mkdir(parents=True, exist_ok=True)
-        # who holds the folder compiles; it is free again when that process ends, however it ends
+        # the holder of the lock compiles; it is released when that process ends in any way
         lock = os.open(folder, os.O_RDONLY)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX)

@@ -12,7 +12,7 @@ from sagittal.server.storage.compile_cache import share_compile_cache
 ONE_THREAD = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
 )
-"""One job computes on one core: same numbers every time, and the web process keeps the other."""
+"""One job uses one core: reproducible numbers, and the web process keeps the other."""
 
 
 def make_environment(settings: Settings) -> dict[str, str]:

@@ -12,7 +12,7 @@ from sagittal.server.processes.child import end_process, start_child
 from sagittal.server.settings import Settings
 
 MOST_WAITING: Final = 3
-"""Errands of a kind that may wait for their turn: each holds one of the few threads that answer requests."""
+"""Queue length for errands of a kind: each occupies one of the few threads that serve requests."""
 
 
 class TooManyErrands(Exception):  # noqa: N818 - says what is refused

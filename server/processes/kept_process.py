@@ -17,13 +17,13 @@ from sagittal.server.settings import Settings
 log = logging.getLogger(__name__)
 
 RESTART_S: Final = (0.0, 0.5, 2.0, 5.0, 15.0)
-"""Pause before a process is replaced, by how many died one after another."""
+"""Pause before a restart, by the number of consecutive crashes."""
 CALM_S: Final = 60.0
-"""A process that has lived so long is not blamed for the deaths before it."""
+"""Run time after which earlier crashes are forgotten."""
 HUNG_S: Final = 20.0
-"""A process that owes an answer and says nothing for so long is replaced."""
+"""A process that owes a response for this long is restarted."""
 GRACE_S: Final = 1.0
-"""Time a process has to end by itself."""
+"""Time limit for a process to end on its own."""
 
 
 class KeptProcess:

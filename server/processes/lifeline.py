@@ -14,7 +14,7 @@ import threading
 from collections.abc import Callable
 
 PR_SET_PDEATHSIG = 1
-"""prctl(2): the signal to get when the parent dies; linux/prctl.h."""
+"""prctl(2): signal on the death of the parent; linux/prctl.h."""
 
 
 _actions: list[Callable[[], None]] = []
@@ -40,4 +40,4 @@ def die_with(parent_pid: int) -> None:
         return
     ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent_pid:
-        os._exit(1)  # it was gone before we asked
+        os._exit(1)  # it ended before we asked

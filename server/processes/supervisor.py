@@ -17,11 +17,11 @@ from sagittal.server.settings import Settings
 log = logging.getLogger(__name__)
 
 LOOK_S = 0.2
-"""Pause between two looks whether all workers live."""
+"""Interval of checks that all workers are running."""
 RESTART_S = 1.0
-"""A worker that has just been started is not replaced more often than this."""
+"""Minimum interval of restarts of a worker."""
 GRACE_S = 5.0
-"""Time a worker has to give its job back before it is killed."""
+"""Time limit for a worker to release its job before it is killed."""
 
 
 class Workers:

@@ -17,7 +17,7 @@ from sagittal.server.report.charts.paper_charts import prepare_figures, read_cha
 STYLES: Final = Path(__file__).parents[2] / "web" / "static" / "css" / "pdf.css"
 
 BLOCKS: Final = frozenset({"p", "li", "td", "th", "dt", "dd", "h1", "h2", "h3", "figcaption"})
-"""What holds lines of text."""
+"""Elements that contain lines of text."""
 
 MISSING: Final = (
     "This server cannot create PDFs: WeasyPrint or the system library Pango is missing. Install "
@@ -45,10 +45,10 @@ def render_pdf(html: str) -> bytes:
     try:
         from weasyprint import HTML
         from weasyprint.urls import URLFetcher
-    except (ImportError, OSError) as error:  # OSError: Pango is not there
+    except (ImportError, OSError) as error:  # OSError: Pango is not installed
         logging.getLogger(__name__).warning("no PDF can be made: %s", error)
         raise PdfMissing from error
-    # it says of every rule for screens that paper does not know it
+    # it warns about every screen-only rule
     logging.getLogger("weasyprint").setLevel(logging.ERROR)
     logging.getLogger("weasyprint.progress").setLevel(logging.ERROR)
     document = HTML(string=html, url_fetcher=URLFetcher(allowed_protocols={"data"}))
@@ -57,7 +57,7 @@ def render_pdf(html: str) -> bytes:
     prepare_figures(page, read_chart_styles(styles))
     _move_foot(page)
     _trim_ends(page)
-    # the last one, so that it goes before those of the document
+    # the last one, so that it precedes those of the document
     SubElement(next(page.iter("head")), "style").text = STYLES.read_text("utf-8")
     content: bytes = document.write_pdf()
     return content

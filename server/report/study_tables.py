@@ -94,7 +94,7 @@ def _list_strides(take: StudyTake) -> Iterator[dict[str, object]]:
         own = [a for a in modelled if a.endswith(f"_{row['side'][0]}")]
         values = {name: _value(cell) for name, cell in row.items()}
         if row.get("excluded_reason", "").startswith(MANUAL):
-            values["excluded_reason"] = MANUAL.removesuffix(":")  # a person's words may name somebody
+            values["excluded_reason"] = MANUAL.removesuffix(":")  # free text may name a patient
         yield {"take": take.name, **take.labels, **values, "estimated_angles": " ".join(own) or None}
 
 

@@ -20,7 +20,7 @@ SYMMETRY = {
     "index_pct": "symmetry_index_pct",
     "angle_pct": "symmetry_angle_pct",
 }
-"""What of the sides compared (core/parameters/symmetry.py) → its column."""
+"""Attribute of the symmetry (core/parameters/symmetry.py) → its column."""
 
 
 def parameters_csv(report: ReportModel) -> bytes:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
 
+from sagittal.core.message import Message
 from sagittal.core.signals.memory import give_memory_back
 from sagittal.server.jobs.attempt import Attempt
 from sagittal.server.provenance import CODE_VERSION
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 REPAIRED: Final = "repaired.json"
-"""The manifest that puts a wrong set-up right, where an analysis proposes one; nobody has confirmed it."""
+"""Proposed manifest that corrects a setup error; unconfirmed."""
 
 
 def run(
@@ -27,15 +28,13 @@ def run(
     config: Mapping[str, Any] | None,
     progress: Progress,
 ) -> dict[str, bytes]:
-    """Analyse the files of one trial to result files (server/report/files/exports.py); like
-    `analyse_files`.
-    """
+    """Analyse the files of one trial and return the result files (server/report/files/exports.py)."""
     from sagittal.core.formats.json_tree import read_json
     from sagittal.server.report.files.exports import analysis_files
 
     results = [analyse_files(files, manifest, config, progress, resumable=False)]
     setup = results[0].setup
-    # by no name here: what is written is let go of
+    # without a local name, so that it is released after writing
     result_files = analysis_files(results.pop(), give_memory_back)
     if setup is not None and setup.can_be_applied:
         declared = read_json(manifest) if manifest is not None else {}
@@ -80,7 +79,7 @@ def analyse_files(
     tell("reading", 0.0)
     chosen = override_config(PipelineConfig(), choose_config(files, config))
     declared = parse_manifest(manifest) if manifest is not None else None
-    # by no name of its own: `analyse` lets go of parts of it
+    # without a local name, so that `analyse` can release parts of it
     return analyse(read_recording(files, declared), chosen, tell, CODE_VERSION, resumable=resumable)
 
 
@@ -127,7 +126,9 @@ def choose_config(files: Sequence[SourceFile], config: Mapping[str, Any] | None)
     try:
         settings = {} if archived is None else read_json(archived)
     except ValueError as error:
-        raise ArchiveError("zip_bad", f"The archive's settings are not valid JSON: {error}.") from error
+        raise ArchiveError(
+            "zip_bad", Message("The archive's settings are not valid JSON: {error}.", error=error)
+        ) from error
     return settings if isinstance(settings, dict) else {}
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from sqlalchemy import Connection
 
+from sagittal.core.message import Message
 from sagittal.core.norms import Norms, look_up_norms
 from sagittal.core.subject.condition import compare_conditions, is_comparable
 from sagittal.server.clinic import patients, programmes, sessions
@@ -38,25 +39,37 @@ class SessionPair:
     @property
     def cautions(self) -> tuple[str, ...]:
         """Differences in walking condition or measurement that may explain a change, as sentences."""
-        reasons = []
+        reasons: list[str] = []
         old, new = self.before, self.after
         if unlike := compare_conditions(old.condition, new.condition):
             reasons.append(
-                f"The conditions differ: {'; '.join(unlike)}. Differences may be due to this and are not "
-                "reported as changes."
+                Message(
+                    "The conditions differ: {unlike}. Differences may be due to this and are not reported as "
+                    "changes.",
+                    unlike="; ".join(unlike),
+                )
             )
         elif old.session.feedback:
             reasons.append("Both were walked with feedback, so differences are not reported as changes.")
         elif unstated := new.condition.unstated:
-            reasons.append(f"Not stated for either visit: {', '.join(unstated)}. Assumed to be the same.")
+            reasons.append(
+                Message(
+                    "Not stated for either visit: {unstated}. Assumed to be the same.",
+                    unstated=", ".join(unstated),
+                )
+            )
         if _sensors(old) != _sensors(new):
             reasons.append("The two visits used sensors on different segments.")
         if old.found.config_sha256 != new.found.config_sha256:
             reasons.append("The two analyses have different settings; run the earlier one again to compare.")
         elif old.found.code_version != new.found.code_version:
             reasons.append(
-                f"The analyses are of different versions ({old.found.code_version}, "
-                f"{new.found.code_version}); run the earlier one again to compare."
+                Message(
+                    "The analyses are of different versions ({code_version}, {code_version2}); run the "
+                    "earlier one again to compare.",
+                    code_version=old.found.code_version,
+                    code_version2=new.found.code_version,
+                )
             )
         return tuple(reasons)
 

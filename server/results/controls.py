@@ -19,8 +19,9 @@ from sagittal.server.storage.schema.tables import patient
 from sagittal.server.storage.schema.tables import session as session_table
 
 NEAR_MPS: Final = 0.2
-"""Controls who walk within this of a person are their reference: speed matters more than age
-(docs/science/norms-and-scores.md, "Speed"); our choice of width, about one SD of comfortable speed."""
+"""Controls within this speed difference serve as reference: speed matters more than age
+(docs/science/norms-and-scores.md, "Speed"); our choice of width, about one SD of comfortable speed.
+"""
 
 
 @dataclass(frozen=True)

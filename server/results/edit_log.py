@@ -17,7 +17,7 @@ from sagittal.server.storage.schema.tables import edit as rows
 from sagittal.server.storage.schema.tables import user
 
 UNDO: Final = "undo"
-"""Kind of the row that takes the last live edit back."""
+"""Kind of the row that undoes the last edit in effect."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 ANALYSED: Final = 0.4
-"""Share of a run after which the take is analysed again and the filters begin."""
+"""Fraction of a run at which the trial has been reanalysed and the filters begin."""
 
 
 @dataclass(frozen=True)

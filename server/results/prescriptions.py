@@ -19,6 +19,7 @@ from sagittal.core.change import ChangeLimit, find_detectable_change
 from sagittal.core.change.limits import Limb
 from sagittal.core.feedback import Baseline, Cue, Prescription
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
@@ -70,8 +71,12 @@ def write(
     if entry.shared and draft.side is not None:
         raise ServiceError(
             "both_sides",
-            f"{entry.label} is common to both sides of a walk, so the {draft.side} side cannot be trained "
-            "alone. Expected both sides, or another parameter.",
+            Message(
+                "{label} is common to both sides of a walk, so the {side} side cannot be trained alone. "
+                "Expected both sides, or another parameter.",
+                label=entry.label,
+                side=draft.side,
+            ),
         )
     targeted = _with_target(c, reviewed, patient, draft)
     previous = in_force(c, patient_id)
@@ -248,11 +253,26 @@ def _refuse_impossible(requested: Prescription) -> None:
     if mean is not None and not low <= mean <= high:
         raise ServiceError(
             "bad_prescription",
-            f"target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit} for {entry.label.lower()}.",
+            Message(
+                "target.mean is {mean:g}{unit}. Expected {low:g} to {high:g}{unit2} for {lower}.",
+                mean=mean,
+                unit=unit,
+                low=low,
+                high=high,
+                unit2=unit,
+                lower=entry.label.lower(),
+            ),
         )
     if sd is not None and sd > high - low:
         raise ServiceError(
-            "bad_prescription", f"target.sd is {sd:g}{unit}. Expected at most {high - low:g}{unit}."
+            "bad_prescription",
+            Message(
+                "target.sd is {sd:g}{unit}. Expected at most {low:g}{unit2}.",
+                sd=sd,
+                unit=unit,
+                low=high - low,
+                unit2=unit,
+            ),
         )
 
 
@@ -265,7 +285,7 @@ def _baseline(
     today = any(t.session_id == session_id for t in alike)
     baseline = Baseline(
         last_level=_last_level(c, [t for t in trained if t.prescription_id == written.id]),
-        # the block opens the visit, not its later takes
+        # the block opens the visit, not its later trials
         after_training=bool(alike) and not today,
     )
     usual = None if walk is None else targets.find_usual_value(walk, content.parameter, content.side)

@@ -16,7 +16,7 @@ from sagittal.server.storage.files.blobs import BlobStore
 from sagittal.server.uploads import recordings
 
 SETUP_KEYS: Final = ("sensors", "corrections", "mounting")
-"""What of a manifest says how sensors are worn and read."""
+"""Manifest keys for sensor placement and mapping."""
 
 
 @dataclass(frozen=True)

@@ -38,16 +38,16 @@ from sagittal.server.storage.files.blobs import BlobStore, IntegrityError, Store
 _Value = TypeVar("_Value")
 
 UNREADABLE: Final = (IntegrityError, StoreAway, FormatError)
-"""Why one visit of a list cannot be read: its own page says what is wrong, the others stay in reach."""
+"""Errors of a single visit in a list: its own page reports them, the others remain accessible."""
 
 NOT_READ: Final = ("poses.parquet", signals.NAME)
 """Files that only the replay and the drawing of signals need."""
 
 ANALYSES_KEPT, RESULTS_KEPT, PARTS_KEPT, PAGES_KEPT = 3, 12, 24, 24
 NUMBERS_KEPT, CONTROLS_KEPT, VERDICTS_KEPT = 240, 500, 5000
-"""Finished analyses, results of edits, signals of one sensor and numbers kept in memory: those at work. Ten
-minutes are some 20 MB, 1 MB, 2 MB and 50 kB; a page that was put into words and drawn is 1 MB, a verdict two
-words, a speed one row."""
+"""Sizes of the caches of finished analyses, edited results, signals of one sensor and numbers. Ten minutes
+take some 20 MB, 1 MB, 2 MB and 50 kB; a rendered page 1 MB, a verdict two words, a speed one row.
+"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,7 +30,7 @@ ACTIONS: Final = {
 }
 """Kind of a row → its action in the audit trail."""
 REDONE: Final = "edit.redone"
-"""Action of an undone edit that is made again."""
+"""Action of a redo."""
 
 
 def make(
@@ -95,7 +95,7 @@ def _make(
     edit: Edit,
     action: str,
 ) -> EditHistory:
-    # measured before the lock is taken: what cannot be is refused, and nobody waits for it
+    # computed before the lock is acquired: impossible edits are rejected without blocking others
     result = reviewed.measure_anew(record, (*history.edits, edit))
     with db.write() as c:
         _refuse_older(c, record, history)
@@ -145,6 +145,6 @@ def _append(
         "at": now(),
     }
     c.execute(insert(rows).values(values))
-    # the reason is free text and stays out of a trail that outlives an erasure
+    # the reason is free text and excluded from an audit trail that outlives an erasure
     fields = {k: v for k, v in content.items() if k != "reason"}
     audit.record(c, actor, action, "session", session_id, {"analysis_id": analysis_record.id, **fields})

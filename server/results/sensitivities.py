@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sqlalchemy import Connection, insert, select
 
 from sagittal.core.errors import EstimationError, InputError
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -31,10 +32,10 @@ if TYPE_CHECKING:
     from sagittal.core.squat.sensitivity import ReferenceAngles
 
 ANALYSED: Final = 0.3
-"""Share of a run after which the take is analysed again and the 24 parameters begin."""
+"""Fraction of a run at which the trial has been reanalysed and the 24 parameters begin."""
 
 TABLE: Final = ".parquet"
-"""Ending of a reference that holds joint angles."""
+"""Extension of a reference with joint angles."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,8 @@ def read_reference(content: bytes, name: str, *, from_standing: bool) -> Referen
         angles = read_angles(content)
     except (KeyError, ValueError, OSError) as error:
         raise InputError(
-            "reference_unreadable", f"“{name}” is not the angles.parquet of an analysis or a simulation."
+            "reference_unreadable",
+            Message("“{name}” is not the angles.parquet of an analysis or a simulation.", name=name),
         ) from error
     offset: Mapping[str, float] = {} if from_standing else angles.zero_offset
     by_name = {n: values + offset.get(n, 0.0) for n, values in angles.angles.items()}
@@ -99,7 +101,9 @@ def run(files: Sequence[SourceFile], params: Mapping[str, Any], attempt: Attempt
     take = analysing.analyse_again(files, params, attempt, ANALYSED)
     if take.calibrated is None or take.legs is None:
         reason = "" if take.problem is None else f" {take.problem.message}"
-        raise EstimationError("no_squats", f"The legs of this take were not followed.{reason}")
+        raise EstimationError(
+            "no_squats", Message("The legs could not be tracked in this trial.{reason}", reason=reason)
+        )
     height = take.recording.subject.height_m
     tables = analyse_legs(
         take.calibrated,

@@ -26,7 +26,7 @@ from sagittal.server.results import analyses
 from sagittal.server.results.reviewed import ReviewedAnalyses, StoredAnalysis
 
 MOST_POINTS: Final = 4000
-"""Parts of a window at most: as many pixels as the widest screens have across."""
+"""Maximum number of bins of a window: the width of the widest screens in pixels."""
 
 AXES: Final = ("x", "y", "z")
 DIGITS: Final = 3
@@ -137,7 +137,7 @@ def _foot_lanes(
                 mounted = turned[FOOT[side]]
                 t_s, axes = _raw(reviewed, record, FOOT[side], "gyr")
                 bias = np.array([b or 0.0 for b in mounted["gyro_bias_dps"]])
-                # the segment's z axis points to the right: turning about it lifts the toes
+                # the segment's z axis points to the right: rotation about it lifts the toes
                 lateral = np.array(mounted["R_segment_sensor"])[2]
                 lines[side] = (np.stack([axes[c] for c in AXES], axis=1) - bias) @ lateral
             return t_s, lines

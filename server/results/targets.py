@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from sagittal.core.feedback import Target
 from sagittal.core.feedback.prescription import TargetSource
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms import Norms, NormValue
 from sagittal.core.norms.values import is_angle
 from sagittal.core.parameters.catalogue import CATALOGUE
@@ -28,7 +29,7 @@ from sagittal.server.results.reviewed import ReviewedAnalyses
 from sagittal.web.words import day
 
 FEWEST: Final = 5
-"""Strides below which a person's own mean and SD are no target (our choice)."""
+"""Minimum number of strides for using a patient's own mean and SD as a target (our choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +142,11 @@ def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
     if entry.better is None:
         return Offer(
             None,
-            f"{entry.label}: neither higher nor lower is better by itself. Choose another source, or enter a "
-            "target.",
+            Message(
+                "{label}: neither higher nor lower is better by itself. Choose another source, or "
+                "enter a target.",
+                label=entry.label,
+            ),
         )
     opposite = _own(walk, parameter, opposite_side(side))
     own = find_usual_value(walk, parameter, side)
@@ -153,8 +157,12 @@ def _better(walk: AnalysedWalk, parameter: str, side: Side) -> Offer:
         return opposite
     return Offer(
         None,
-        f"The {side} side is the better one on {day(walk.session.performed_on)}. Train the other side, or "
-        "choose another source.",
+        Message(
+            "The {side} side is the better one on {performed_on}. Train the other side, or choose "
+            "another source.",
+            side=side,
+            performed_on=day(walk.session.performed_on),
+        ),
     )
 
 
@@ -172,7 +180,7 @@ def _norm(walk: AnalysedWalk, parameter: str) -> Offer:
     else:
         norm_value = next((v for v in values if v is not None), None)
         text = "There is no norm of this parameter." if norm_value is None else norm_value.note
-    return Offer(None, f"{text} Choose another source, or enter a target.")
+    return Offer(None, Message("{text} Choose another source, or enter a target.", text=text))
 
 
 def _serves(value: NormValue | None) -> bool:
@@ -181,16 +189,27 @@ def _serves(value: NormValue | None) -> bool:
 
 def _own(walk: AnalysedWalk, parameter: str, side: Side | None) -> Offer:
     usual = find_usual_value(walk, parameter, side)
-    label = "both sides" if side is None else f"{side} side"
+    label = "both sides" if side is None else Message("{side} side", side=side)
     if usual is None or usual.mean is None or not usual.sd or usual.n < FEWEST:
         n = 0 if usual is None else usual.n
         return Offer(
             None,
-            f"The {label} has {n} {plural(n, 'stride', 'strides')} with this parameter on "
-            f"{day(walk.session.performed_on)}; expected at least {FEWEST} that differ. Choose another "
-            "source, or enter a target.",
+            Message(
+                f"The {{label}} has {{value}} {plural(n, 'stride', 'strides')} with this parameter on "
+                "{performed_on}; expected at least {FEWEST} that differ. Choose another source, or "
+                "enter a target.",
+                label=label,
+                value=n,
+                performed_on=day(walk.session.performed_on),
+                FEWEST=FEWEST,
+            ),
         )
-    words = f"{label}, {usual.n} {plural(usual.n, 'stride', 'strides')} on {day(walk.session.performed_on)}"
+    words = Message(
+        f"{{label}}, {{usual}} {plural(usual.n, 'stride', 'strides')} on {{performed_on}}",
+        label=label,
+        usual=usual.n,
+        performed_on=day(walk.session.performed_on),
+    )
     source: TargetSource = "own_baseline"
     return Offer(Target(source, usual.mean, usual.sd, words, walk.session.id))
 

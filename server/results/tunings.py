@@ -22,6 +22,7 @@ from sagittal.core.errors import ParameterError
 from sagittal.core.fusion.algorithms.choice import require_tunable
 from sagittal.core.fusion.algorithms.schemes import Scheme as Scheme
 from sagittal.core.fusion.algorithms.swarm import MOST_OF_SWARM as MOST_OF_SWARM
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 RESULT: Final = "tuning.json"
 TRIAL: Final = ".npz"
 BEHIND: Final = 10
-"""Added to the niceness of each thread that searches (a thread's own on Linux)."""
+"""Increment of the nice value of each search thread (per thread on Linux)."""
 SWARM: Final = ("particles", "iterations", "rounds", "random_rounds")
 
 
@@ -52,8 +53,8 @@ class TuningOrder:
     Parameters
     ----------
     validation : names of validation trials. scheme : adaptation of gains to the motion, None = default.
-    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None =
-    as in the thesis.
+    magnetometer : None = if the algorithm supports it. particles … random_rounds : of the swarm, None = as in
+        the thesis.
     """
 
     algorithm: str
@@ -155,7 +156,8 @@ def submit(
     trials = {path.stem for f in this.files if (path := PurePosixPath(f.name)).suffix == TRIAL}
     if unknown := sorted(set(order.validation) - trials):
         raise Conflict(
-            "no_such_trial", f"There is no trial “{'”, “'.join(unknown)}” among the visit's files."
+            "no_such_trial",
+            Message("There is no trial “{unknown}” among the visit's files.", unknown="”, “".join(unknown)),
         )
     params = {**recordings.job_inputs(this), "order": asdict(order)}
     view = queue.submit(

@@ -29,11 +29,11 @@ from sagittal.server.storage.schema.tables import now
 log = logging.getLogger(__name__)
 
 TEST_EVERY: Final = dt.timedelta(days=7)
-"""How old the last restore test may be before the next one."""
+"""Maximum age of the last restore test."""
 TRY_AGAIN: Final = dt.timedelta(hours=1)
-"""Pause after a backup or a test that failed."""
+"""Pause after a failed backup or test."""
 LATE: Final = dt.timedelta(hours=26)
-"""Age of the newest backup from which somebody should be told."""
+"""Age of the newest backup from which a warning is issued."""
 
 NOT_TESTED: Final = (
     "It is encrypted for a key that is not on this computer. Try it where the key is: "
@@ -160,7 +160,7 @@ def _test(settings: Settings, folder: Path, key: ClinicKey | None) -> Outcome:
     message = f"{restored.patients} patients, {restored.sessions} visits, {restored.files} files."
     if restored.names_open:
         return Outcome(now(), True, newest.name, message)
-    # what is not encrypted never holds the key; what is should
+    # unencrypted backups never contain the key; encrypted ones should
     return Outcome(now(), key is None, newest.name, f"{message} {CLOSED}")
 
 

@@ -42,20 +42,20 @@ from sagittal.server.storage.schema.tables import job, new_id, now, patient, ses
 log = logging.getLogger(__name__)
 
 FORMAT: Final = 1
-"""Version of the manifest; a later one may add keys, never change these."""
+"""Version of the manifest; later versions may add keys but never change these."""
 MANIFEST: Final = "manifest.json"
 DATABASE: Final = "sagittal.db"
 IDENTITY_KEY: Final = "identity.key"
-"""The key of patients' names, wherever it is kept; in encrypted backups only."""
+"""The identity key, wherever it is stored; in encrypted backups only."""
 ENDS: Final = (".tar", ".tar.age")
-"""How the name of a backup ends; any other name is a folder that is not there."""
+"""File name extension of a backup; other names are folders that do not exist."""
 DAYS, WEEKS, MONTHS = 7, 4, 12
-"""Of each of so many days, weeks and months that have backups, `prune` keeps the newest one."""
+"""`prune` retains the newest backup of each of this many days, weeks and months that have any."""
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
 _NAME: Final = re.compile(r"sagittal-(\d{8}T\d{6}Z)\.tar(?:\.age)?")
 _LEFT_BEHIND: Final = re.compile(r"[0-9a-f]{32}\.tmp")
 _OLD_S: Final = 86_400.0
-"""Age from which a half-written file in a folder of backups belongs to nobody."""
+"""Age from which a partial file in a backup folder is abandoned."""
 
 
 class BackupError(Exception):
@@ -196,13 +196,13 @@ def _write(
         with write_archive(file, key) as archive:
             _add_live(archive, settings, content)
             with _snapshot(db, settings) as copy, closing(Database(copy)) as snapshot:
-                # what a job goes on from is computed again; it may be replaced at any moment
+                # checkpoints can be recomputed and may be replaced at any moment
                 with snapshot.write() as c:
                     c.execute(update(job).values(checkpoint=None))
                 with snapshot.read() as c:
                     used, head = sorted(list_referenced(c)), read_newest(c)
                     people, visits = count_patients_and_sessions(c)
-                snapshot.close()  # folds its write-ahead log into the file
+                snapshot.close()  # merges its write-ahead log into the file
                 revision = read_revision(copy)
                 _add(archive, DATABASE, copy, content)
             _add_blobs(archive, settings, used, content)
@@ -249,7 +249,7 @@ def _add(archive: ArchiveWriter, name: str, path: Path, content: _Content) -> No
 
 
 def _add_open(archive: ArchiveWriter, name: str, source: BinaryIO, content: _Content) -> None:
-    # a live log grows meanwhile: what is there now is a whole beginning of it
+    # a live log grows meanwhile: the present content is a valid prefix
     size = source.seek(0, io.SEEK_END)
     source.seek(0)
     content.files.append((name, size, archive.add(name, source, size)))
@@ -277,7 +277,7 @@ def _add_names_key(
 def _add_live(archive: ArchiveWriter, settings: Settings, content: _Content) -> None:
     for pattern in ("*.log", "*.damaged"):
         for path in sorted(one for folder in settings.live_folders for one in folder.glob(pattern)):
-            with contextlib.suppress(FileNotFoundError):  # its take has just ended: a recording by now
+            with contextlib.suppress(FileNotFoundError):  # its trial has just ended and is now a recording
                 _add(archive, f"live/{path.name}", path, content)
 
 
@@ -294,7 +294,7 @@ def _add_blobs(
             _add_open(archive, f"blobs/{space}/{sha256}", source, content)
         name, _, digest = content.files[-1]
         if digest != sha256:
-            # its bytes stay in the archive for whoever can mend them; a restore takes it for what it is
+            # its bytes remain in the archive for manual repair; a restore treats it as damaged
             log.error("%s has changed on the disk; see `sagittal check`", name)
             content.missing.append((space, sha256))
 

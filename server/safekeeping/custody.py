@@ -159,7 +159,7 @@ def _strangers_if_known(settings: Settings, erased: set[str]) -> str | None:
 def _strangers(settings: Settings, erased: set[str]) -> str | None:
     spaces, takes = erasure.list_unfinished(settings)
     leaving = erased | spaces | {INCOMING}
-    # a folder that was never a clinic's is left as it is: opening would make one
+    # a folder that never belonged to a clinic is left unchanged: opening would create files
     stored = open_blobs(settings).files() if settings.bucket or settings.blobs.exists() else ()
     files = sum(1 for f in stored if f.space not in leaving)
     paths = (path for folder in settings.live_folders for path in folder.glob("*.log"))

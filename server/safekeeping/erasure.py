@@ -20,6 +20,7 @@ from sqlalchemy import Connection, delete, select, update
 from sqlalchemy.exc import SQLAlchemyError
 
 from sagittal.core.formats.json_tree import read_json
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import patients, sessions
 from sagittal.server.errors import Conflict
@@ -78,7 +79,8 @@ def erase_patient(
         target = patients.get(c, patient_id)
         if confirm.strip() != target.code:
             raise Conflict(
-                "not_confirmed", f"To delete this patient for good, repeat the code '{target.code}'."
+                "not_confirmed",
+                Message("To delete this patient for good, repeat the code '{code}'.", code=target.code),
             )
         mine = select(session.c.id).where(session.c.patient_id == patient_id)
         parts = list(c.execute(select(file_upload.c.id).where(file_upload.c.session_id.in_(mine))).scalars())
@@ -157,7 +159,7 @@ def finish(db: Database, blobs: BlobStore, settings: Settings) -> None:
             log.error("%s cannot be read; what it was to erase is not known any more", path)
             continue
         try:
-            # a store that is away is found out before the lock, which others wait for
+            # detect an unavailable store before acquiring the lock, for which others wait
             blobs.has("0" * 32, "0" * 64)
             _remove(db, blobs, settings, note)
             is_gone = db.fold()
@@ -213,7 +215,7 @@ def _note(
 def _read(path: Path) -> dict[str, Any] | None:
     try:
         note: Any = read_json(path.read_bytes())
-        # earlier versions knew no parts
+        # earlier versions had no parts
         spaces, takes, parts = ([str(x) for x in note.get(key, [])] for key in ("spaces", "takes", "parts"))
         files = [(str(space), str(name)) for space, name in note["files"]]
         if not all(map(_ID.fullmatch, [*spaces, *takes, *parts, *(space for space, _ in files)])):
@@ -257,5 +259,5 @@ def _remove(db: Database, blobs: BlobStore, settings: Settings, note: dict[str, 
     for folder in (blobs.incoming, *settings.live_folders):
         if folder.is_dir():
             fs.sync_folder(folder)
-    with db.write():  # a sweep makes folders there under this lock
+    with db.write():  # a sweep creates folders there under this lock
         trash.tidy()

@@ -20,13 +20,13 @@ from sagittal.server.storage.high_water import read_newest
 from sagittal.server.storage.migrate import MigrationError, exists, require_current
 
 _MAY_BE_THERE: Final = {"lost+found", "cache", "server.lock", "workers.lock", "part-locks"}
-"""What an empty data folder may hold."""
+"""Permitted content of an empty data folder."""
 _OF_A_START: Final = re.compile(
     r"(backups|blobs(/incoming)?|nodes|nodes/[^/]+)/|nodes/(key(\.lock)?|[^/]+/server\.lock)"
 )
-"""Folders (with a slash) and files that a trial of a backup, or a server that did not start, may leave."""
+"""Folders (with a slash) and files left by a restore test or a failed start."""
 _MARGIN: Final = 1.1
-"""Room that a restore needs, as a part of the archive."""
+"""Space required by a restore, relative to the archive."""
 
 
 class RestoreError(Exception):
@@ -43,7 +43,7 @@ def make_empty(settings: Settings) -> None:
     if stage.exists() and not _has_database(settings):
         if name_placing(stage).exists():
             placing = _read_placing(stage)
-            # the folder was empty when this was written, so these are the restore's own
+            # the folder was empty when this was written, so these files belong to the restore
             for folder in (settings.blobs, settings.live):
                 fs.remove_tree(folder)
             for path in (settings.mark, settings.second_factor_key, settings.data_dir / IDENTITY_KEY):
@@ -61,8 +61,8 @@ def make_empty(settings: Settings) -> None:
             f"{settings.data_dir} is not empty ({', '.join(names[:5])}). Restore into an empty folder; move "
             "the old one aside first, and keep it."
         )
-    fs.remove_tree(settings.blobs)  # no file is in it
-    # one that a killed restore has begun to fill was empty then: the same files are put again
+    fs.remove_tree(settings.blobs)  # it contains no file
+    # the bucket was empty when a killed restore began to fill it: the same files are uploaded again
     if settings.bucket and placing != settings.bucket:
         _require_empty_bucket(settings)
 

@@ -176,7 +176,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
     """Extract and verify everything in the staging folder, and repeat erasures."""
     manifest = _extract(archive, stage, key)
     upgrade(stage.database)
-    fs.remove_tree(stage.backups)  # the copy that the upgrade made
+    fs.remove_tree(stage.backups)  # the copy created by the upgrade
     blobs = FolderBlobs(stage.blobs)
     fs.make_folder(stage.live)
     with closing(Database(stage.database)) as db:
@@ -193,7 +193,7 @@ def _prepare(archive: Path, stage: Settings, key: ClinicKey | None, gone: Tombst
             raise RestoreError(f"{archive.name}: {defects[0].area}: {defects[0].message}")
         erased_counts = _erase_again(db, blobs, stage, gone | manifest.erased)
         with db.write() as c:
-            # who had signed in then has not signed in here; what was revoked since must not work again
+            # earlier sign-ins are not valid here; later revocations must not be undone
             for table in (login_session, failed_attempt, web_node):
                 c.execute(delete(table))
             c.execute(update(live_take).values(node=None, node_run=None))

@@ -62,7 +62,7 @@ def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
         removable, gone = [], []
         trash.prepare(going, time)
         with db.write() as c:
-            # again: somebody may have been erased while copies were made
+            # again: data may have been erased while copies were made
             used, since = _list_used(c), erasure.list_erased_spaces(c, {f.space for f in group})
             for stored in group:
                 if (stored.space, stored.name) in used or not blobs.is_older(stored, settings.sweep_grace_s):
@@ -81,7 +81,7 @@ def _sweep(db: Database, blobs: BlobStore, settings: Settings) -> int:
     trash.expire(now())
     with db.read() as c:
         erased = erasure.list_erased_spaces(c)
-    # a sweep that was killed between copying and taking leaves copies
+    # a sweep killed between copying and taking leaves copies
     if left := [one for one in trash.files() if one.space in erased]:
         trash.drop(left)
     return count

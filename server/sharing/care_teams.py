@@ -13,6 +13,7 @@ from unicodedata import normalize
 
 from sqlalchemy import Connection, Row, Select, case, delete, exists, insert, select, union, update
 
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
@@ -26,11 +27,11 @@ from sagittal.server.storage.schema.tables import audit as audit_table
 from sagittal.server.storage.schema.tables import new_id, now, patient, session, user
 
 EMERGENCY: Final = dt.timedelta(hours=4)
-"""How long a patient stays open to who opened him or her in an emergency (our choice)."""
+"""Duration of emergency access (our choice)."""
 SHOWN: Final = dt.timedelta(days=90)
-"""How long the patient's page shows that; the audit log keeps it."""
+"""How long the patient's page shows it; the audit log retains it."""
 REASON: Final = (10, 500)
-"""Characters of a reason, at least and at most."""
+"""Minimum and maximum length of a reason."""
 _NOT_OF_A_TEAM: Final = (
     "emergency.opened",
     "emergency.ended",
@@ -38,7 +39,7 @@ _NOT_OF_A_TEAM: Final = (
     "patient.hidden",
     "study.exported",
 )
-"""Rows of the audit log that put nobody into a team: from outside it, or of a study over many visits."""
+"""Audit actions that do not make a user a team member: access from outside, or studies over many visits."""
 
 
 @dataclass(frozen=True)
@@ -171,8 +172,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     Raises
     ------
     NotFound : no patient has exactly this code. ServiceError bad_value : the reason is too short or too long.
-        Conflict
-    care_teams_off, seen_already.
+    Conflict : care_teams_off, seen_already.
     """
     if not are_on(c):
         raise Conflict(
@@ -182,8 +182,13 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
     if not REASON[0] <= len(text) <= REASON[1]:
         raise ServiceError(
             "bad_value",
-            f"The reason has {len(text)} {plural(len(text), 'character', 'characters')}. "
-            f"Expected {REASON[0]} to {REASON[1]}.",
+            Message(
+                f"The reason has {{text}} {plural(len(text), 'character', 'characters')}. Expected "
+                "{REASON} to {REASON2}.",
+                text=len(text),
+                REASON=REASON[0],
+                REASON2=REASON[1],
+            ),
         )
     normalized = normalize("NFKC", code).strip()
     patient_id = c.execute(select(patient.c.id).where(patient.c.code == normalized)).scalar()
@@ -200,7 +205,7 @@ def open_in_emergency(c: Connection, user: Identity, code: str, reason: str) -> 
         "ends_at": time + EMERGENCY,
     }
     c.execute(insert(emergency_access).values(**row, user_id=user.user_id))
-    # the reason stays with the patient, and goes when the patient is erased; the row of the log does not
+    # the reason is stored with the patient and deleted with it; the audit row remains
     detail = {"access": row["id"], "hours": EMERGENCY / dt.timedelta(hours=1)}
     audit.record(c, user, "emergency.opened", "patient", patient_id, detail)
     return _get_access(c, row["id"])
@@ -221,7 +226,8 @@ def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAcc
     access = _get_access(c, access_id)
     if not may_end(access, user):
         raise NotAllowed(
-            "not_yours", f"{access.by} opened this patient. Ask that person or an administrator to end it."
+            "not_yours",
+            Message("{by} opened this patient. Ask that person or an administrator to end it.", by=access.by),
         )
     if access.is_open:
         mine = emergency_access.c.id == access_id
@@ -234,7 +240,7 @@ def end_emergency(c: Connection, user: Identity, access_id: str) -> EmergencyAcc
 
 def end_all_emergencies(c: Connection) -> None:
     """End all emergency accesses after a restore, since later changes to them are unknown."""
-    # those that are over too: the clock of this computer may be ahead
+    # including ended ones: the clock of this computer may be ahead
     unended = update(emergency_access).where(emergency_access.c.ended_at.is_(None))
     over = case((is_emergency_open(), now()), else_=emergency_access.c.ends_at)
     c.execute(unended.values(ended_at=over))

@@ -16,7 +16,7 @@ from sagittal.server.storage.db import Database
 from sagittal.server.storage.files.blobs import BlobStore
 
 LONGEST_S: Final = 60.0
-"""Longest one may take; a report takes some seconds."""
+"""Time limit; a report takes some seconds."""
 
 _turn = ErrandTurn()
 

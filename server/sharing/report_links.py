@@ -15,6 +15,7 @@ from typing import Final
 
 from sqlalchemy import ColumnElement, Connection, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.auth.identity import Identity
 from sagittal.server.auth.roles import POLICY, Action
@@ -30,7 +31,7 @@ from sagittal.server.storage.schema.tables import new_id, now, session, user
 MOST_DAYS: Final = 90
 USUAL_DAYS: Final = 14
 QUIET: Final = dt.timedelta(minutes=1)
-"""Openings of a link within this time are one."""
+"""Openings of a link within this time count as one."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +84,17 @@ def make(
     """
     report = signed_reports.get(c, report_id)
     if not report.in_force:
-        raise Conflict("not_in_force", f"Version {report.number} was reopened. Share the signed version.")
+        raise Conflict(
+            "not_in_force",
+            Message("Version {number} was reopened. Share the signed version.", number=report.number),
+        )
     if not 1 <= days <= MOST_DAYS:
-        raise ServiceError("bad_value", f"A link is valid for {days} days; expected 1 to {MOST_DAYS}.")
+        raise ServiceError(
+            "bad_value",
+            Message(
+                "A link is valid for {days} days; expected 1 to {MOST_DAYS}.", days=days, MOST_DAYS=MOST_DAYS
+            ),
+        )
     token, link_id, time = new_token(), new_id(), now()
     expires_at = time + dt.timedelta(days=days)
     patient_id = sessions.get(c, report.session_id).patient_id
@@ -216,4 +225,4 @@ _WITH_MAKER: Final = (
     .join(signed_report, signed_report.c.id == report_link.c.report_id)
     .join(session, session.c.id == signed_report.c.session_id)
 )
-"""Ids of links, joined with their makers and sessions."""
+"""Ids of links, joined with their creators and sessions."""

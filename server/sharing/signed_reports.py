@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, func, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import Conflict, NotFound, ServiceError
@@ -23,9 +24,9 @@ from sagittal.server.storage.schema.report_tables import assessment, report_file
 from sagittal.server.storage.schema.tables import now, session
 
 MOST_CHARACTERS: Final = 10_000
-"""Of the reason to reopen a report."""
+"""Maximum length of the reason for reopening a report."""
 ASSESSMENT_CHARACTERS: Final = 420
-"""Of the therapist's text, as many as fit on the first sheet beside the profile."""
+"""Maximum length of the assessment, as many as fit on the first page next to the profile."""
 
 DOCUMENT: Final = "report.html"
 PSEUDONYMISED: Final = "shared.html"
@@ -113,8 +114,12 @@ def write_assessment(c: Connection, actor: audit.Actor | None, session_id: str, 
     if len(text) > ASSESSMENT_CHARACTERS:
         raise ServiceError(
             "text_too_long",
-            f"The assessment has {len(text)} characters; at most {ASSESSMENT_CHARACTERS} fit. "
-            "Nothing was changed.",
+            Message(
+                "The assessment has {text} characters; at most {ASSESSMENT_CHARACTERS} fit. Nothing "
+                "was changed.",
+                text=len(text),
+                ASSESSMENT_CHARACTERS=ASSESSMENT_CHARACTERS,
+            ),
         )
     c.execute(delete(assessment).where(assessment.c.session_id == session_id))
     if text:
@@ -128,7 +133,10 @@ def require_open(c: Connection, session_id: str) -> None:
     if report is not None:
         raise Conflict(
             "report_signed",
-            f"Version {report.number} of this report is signed and locked. Reopen it first, with a reason.",
+            Message(
+                "Version {number} of this report is signed and locked. Reopen it first, with a reason.",
+                number=report.number,
+            ),
         )
 
 
@@ -184,10 +192,15 @@ def reopen(c: Connection, actor: audit.Actor | None, report_id: str, reason: str
     """Reopen a signed report, which remains readable. Raises NotFound, Conflict, bad_value."""
     report = get(c, report_id)
     if not report.in_force:
-        raise Conflict("not_in_force", f"Version {report.number} has already been reopened.")
+        raise Conflict(
+            "not_in_force", Message("Version {number} has already been reopened.", number=report.number)
+        )
     text = reason.strip()
     if not 1 <= len(text) <= MOST_CHARACTERS:
-        raise ServiceError("bad_value", f"A reason has 1 to {MOST_CHARACTERS:,} characters.")
+        raise ServiceError(
+            "bad_value",
+            Message("A reason has 1 to {MOST_CHARACTERS:,} characters.", MOST_CHARACTERS=MOST_CHARACTERS),
+        )
     c.execute(
         update(signed_report)
         .where(signed_report.c.id == report_id)

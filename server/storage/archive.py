@@ -25,6 +25,7 @@ from typing import IO, BinaryIO, Final, Protocol
 
 import pyrage
 
+from sagittal.core.message import Message
 from sagittal.server.storage import fs
 
 PIECE: Final = 1 << 20
@@ -66,7 +67,7 @@ def make_key(path: Path) -> str:
     exists.
     """
     if path.exists():
-        raise BackupFileError(f"{path} exists; an existing key is never overwritten.")
+        raise BackupFileError(Message("{path} exists; an existing key is never overwritten.", path=path))
     private = pyrage.x25519.Identity.generate()
     public = str(private.to_public())
     fs.write_file(path, f"# public key: {public}\n{private}\n".encode())
@@ -148,7 +149,7 @@ def write_archive(sink: Sink, key: ClinicKey | None = None) -> Iterator[ArchiveW
             yield ArchiveWriter(tar)
     except BaseException:
         worker.end()
-        if counting.error is not None:  # why the pipe broke
+        if counting.error is not None:  # cause of the broken pipe
             raise counting.error from None
         raise
     worker.end()
@@ -187,7 +188,7 @@ def _decrypted(
     pipe = os.fdopen(read_end, "rb", buffering=PIECE)
     try:
         yield from _members(path, pipe)
-        while pipe.read(PIECE):  # what pads the tar: the end is authenticated too
+        while pipe.read(PIECE):  # padding of the tar: the end is authenticated too
             pass
     except GeneratorExit:
         pipe.close()
@@ -218,7 +219,7 @@ def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFi
         with tarfile.open(fileobj=file, mode="r|") as tar:
             while (member := tar.next()) is not None:
                 tar.members = []  # type: ignore[attr-defined]  # it would remember each for ever
-                # a sparse one has its zeros for nothing: a few bytes would fill the disk
+                # zeros of a sparse file cost nothing: a few bytes could fill the disk
                 is_file = member.isreg() and not member.issparse()
                 content = tar.extractfile(member) if is_file else None
                 if content is None:
@@ -226,7 +227,7 @@ def _members(path: Path, file: BinaryIO) -> Generator[tuple[str, int, ArchivedFi
                         f"{path.name} holds {member.name}, which is no file; it is not ours."
                     )
                 yield member.name, member.size, ArchivedFile(content, path)
-    except (tarfile.TarError, EOFError, ValueError) as error:  # ValueError: a header of no numbers
+    except (tarfile.TarError, EOFError, ValueError) as error:  # ValueError: a header with invalid numbers
         raise _damaged(path) from error
 
 
@@ -251,7 +252,7 @@ class _Counting:
 
     def __init__(self, sink: Sink) -> None:
         self._sink = sink
-        self.error: OSError | None = None  # age's own error does not say which
+        self.error: OSError | None = None  # age's own error does not identify it
 
     def write(self, data: bytes) -> int:
         try:
@@ -284,5 +285,5 @@ class _Background:
         except BaseException as error:  # noqa: BLE001 - told by whoever waits
             self.error = error
         finally:
-            with contextlib.suppress(OSError):  # the other end may be closed already
+            with contextlib.suppress(OSError):  # the other end may already be closed
                 self._end_of_pipe.close()

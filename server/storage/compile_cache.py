@@ -19,9 +19,9 @@ from typing import Final
 from sagittal import core
 
 VARIABLE: Final = "NUMBA_CACHE_DIR"
-"""Environment variable from which numba takes its folder, when it is imported."""
+"""Environment variable read by numba at import."""
 KEEP_S: Final = 60 * 24 * 3600.0
-"""A folder of another version that nobody has used for so long is removed."""
+"""Folders of other versions unused for this long are removed."""
 
 _IMPORTED = re.compile(
     r"^\s*(?:from|import)\s+(sagittal\.core(?:\.\w+)*)(?:\s+import\s+(?:\(([\w,\s]+)\)|([\w, ]+)))?",
@@ -121,7 +121,7 @@ def _is_ours(folder: Path) -> bool:
     """Create the folder; return whether it exists, belongs to this user and is writable."""
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        # somebody else's folder may hold somebody else's machine code
+        # a folder of another user may contain foreign machine code
         if folder.stat().st_uid != os.getuid() or not os.access(folder, os.W_OK | os.X_OK):
             return False
         os.utime(folder)

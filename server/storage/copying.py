@@ -11,7 +11,7 @@ from sagittal.server.storage.db import highest_number, raise_number
 from sagittal.server.storage.schema.columns import Json
 
 _AT_ONCE = 500
-"""Rows in memory."""
+"""Rows in memory at a time."""
 _ALEMBIC = "alembic_version"
 
 
@@ -42,5 +42,5 @@ def _reflect(c: Connection) -> MetaData:
     for table in reflected.tables.values():
         for column in table.columns:
             if isinstance(column.type, JSON):
-                column.type = Json  # no value is NULL, not the word null
+                column.type = Json  # no value is NULL, not the JSON null
     return reflected

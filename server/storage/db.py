@@ -23,7 +23,7 @@ from sagittal.server.storage.single import without_transactions
 from sagittal.server.storage.sqlite_file import SqliteFile
 
 Source = Path | str
-"""Where a database is: the path of an SQLite file, or a URL postgresql://user:password@host:port/database."""
+"""Location of a database: path of an SQLite file, or URL postgresql://user:password@host:port/database."""
 
 
 class Database:
@@ -32,7 +32,7 @@ class Database:
     def __init__(self, source: Source) -> None:
         self.source = source
         self._engine = engine_of(source)
-        # threads of one process queue here in turn; SQLite's own waiting is a lottery that somebody may lose
+        # threads of one process queue here in order; SQLite's own waiting is unfair and may starve one
         self._turn = threading.RLock()
         self._writer = self._engine.writer()
         self._reader = self._engine.reader()

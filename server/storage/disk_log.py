@@ -16,7 +16,7 @@ from typing import Final
 from sagittal.server.storage.refusal import refusal_of
 
 QUIET_S: Final = 60.0
-"""A disk that is full on and off is reported at most this often."""
+"""Minimum interval of reports about an intermittently full disk."""
 
 
 class DiskLog:

@@ -22,6 +22,7 @@ from cryptography.exceptions import InvalidTag
 from cryptography.hazmat.primitives.ciphers.aead import AESGCM
 
 from sagittal.core.errors import SagittalError
+from sagittal.core.message import Message
 from sagittal.server.storage import fs
 
 _LINE: Final = re.compile(r"SAGITTAL-FIELD-KEY-1 ([0-9a-f]{64})")
@@ -74,27 +75,40 @@ class FieldKeys:
         """Decrypt a value of this field and row; raises ValueUnreadable."""
         key_name, nonce = sealed[1 : 1 + _NAME_BYTES], sealed[1 + _NAME_BYTES : _HEAD]
         if sealed[:1] != _VERSION or len(sealed) < _HEAD + _TAG_BYTES:
-            raise ValueUnreadable("identity_damaged", f"The {say_field(name)} is damaged. {_MEND}")
+            raise ValueUnreadable(
+                "identity_damaged", Message("The {name} is damaged. {MEND}", name=say_field(name), MEND=_MEND)
+            )
         key = self.keys.get(key_name)
         if key is None:
             raise ValueUnreadable(
                 "identity_key_wrong",
-                f"The {say_field(name)} was encrypted with key {key_name.hex()}, which is not the installed "
-                "one. The administrator must restore the right key file.",
+                Message(
+                    "The {name} was encrypted with key {hex}, which is not the installed one. The "
+                    "administrator must restore the right key file.",
+                    name=say_field(name),
+                    hex=key_name.hex(),
+                ),
             )
         try:
             return AESGCM(key).decrypt(nonce, sealed[_HEAD:], _bind(row_id, name)).rstrip(b"\0").decode()
         except InvalidTag as error:
             raise ValueUnreadable(
                 "identity_damaged",
-                f"The {say_field(name)} was changed, or belongs to another patient. {_MEND}",
+                Message(
+                    "The {name} was changed, or belongs to another patient. {MEND}",
+                    name=say_field(name),
+                    MEND=_MEND,
+                ),
             ) from error
 
 
 def make_keys(path: Path) -> str:
     """Write a file with a new key, readable by its owner only; return its name; KeyUnusable if it exists."""
     if path.exists():
-        raise KeyUnusable("identity_key_exists", f"{path} exists; an existing key is never overwritten.")
+        raise KeyUnusable(
+            "identity_key_exists",
+            Message("{path} exists; an existing key is never overwritten.", path=path),
+        )
     key = os.urandom(32)
     _write(path, [key])
     return _name(key).hex()
@@ -102,7 +116,7 @@ def make_keys(path: Path) -> str:
 
 def add_key(path: Path) -> None:
     """Add a new key to a file, which encrypts from now on. Raises KeyUnusable."""
-    # a link leads to where the file is kept
+    # follow a link to the actual key file
     _write(path.resolve(), [os.urandom(32), *read_keys(path).keys.values()])
 
 

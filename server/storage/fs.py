@@ -96,7 +96,7 @@ class IncomingFile:
         try:
             self._fd: int | None = system.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL)
         except OSError as error:
-            error.filename = str(folder)  # a name that nobody chose helps nobody
+            error.filename = str(folder)  # an unrecognizable name would not help
             raise
 
     @property
@@ -154,13 +154,13 @@ class AppendOnlyFile:
 
     def __init__(self, path: Path, size: int) -> None:
         self.size = size
-        self._reach: int | None = None  # how far the file may reach; None = not known
+        self._reach: int | None = None  # possible length of the file; None = unknown
         self._fd: int | None = system.open(path, os.O_WRONLY | os.O_APPEND)
 
     def append(self, data: bytes) -> None:
         """Append data, durable only after `sync`. After an OSError nothing has been added."""
         fd = self._descriptor()
-        if self._reach != self.size:  # a torn append may be there, from before a crash or a full disk
+        if self._reach != self.size:  # a partial append may exist, from before a crash or a full disk
             self.cut(self.size)
         self._reach = None
         remaining = memoryview(data)

@@ -32,7 +32,7 @@ from sagittal.server.storage.schema.tables import audit
 log = logging.getLogger(__name__)
 
 INTERVAL_S: Final = 5.0
-"""Pause between two looks of the keeper; each costs two syncs, and only when something was written."""
+"""Update interval; each update costs two syncs, and happens only after writes."""
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
 
 
@@ -142,14 +142,14 @@ class MarkKeeper:
                 try:
                     due = changes.has_changed() or due
                     if due:
-                        # one at a time: else the slower of two would put the mark back
+                        # one at a time: otherwise the slower of two would lower the mark
                         with self._db.do_alone("mark") as is_mine:
                             if is_mine:
                                 raise_mark(self._db, self._path)
                         due = not is_mine
                     refused = False
                 except (OSError, SQLAlchemyError, sqlite3.Error) as error:
-                    # a full disk must not end the clinic; the mark only lags, and follows later
+                    # a full disk must not stop the clinic; the mark only lags
                     if not refused:
                         log.warning("%s is not written (%s); trying again", self._path.name, error)
                     refused = True

@@ -31,7 +31,7 @@ from sagittal.server.storage.sqlite_file import SqliteFile
 log = logging.getLogger(__name__)
 
 WAIT_S = 1.0
-"""Pause between two looks whether the schema is there."""
+"""Interval of checks for the schema."""
 
 INSTALLED = Path(server.__file__).parent / "migrations"
 SOURCE = Path(server.__file__).resolve().parents[1] / "migrations"
@@ -52,7 +52,7 @@ _OTHERS_WORK = (
     "perhaps (at {}). Stop them, then start this version. Nothing was changed."
 )
 OTHERS_LEAVE_S = 5.0
-"""How long a migration waits for other programs, which may only have looked, to leave the database."""
+"""How long a migration waits for other programs, which may only have checked, to disconnect."""
 _OTHER_MIGRATES = "Another program is changing the database for its version. Start again when it is done."
 
 
@@ -90,7 +90,7 @@ def read_revision(database: Source) -> str | None:
         if isinstance(kind, PostgresServer):
             raise MigrationError(kind.explain(error)) from error
         refusal = refusal_of(error)
-        if refusal is not None:  # SQLite needs some room even to read
+        if refusal is not None:  # SQLite needs some space even for reading
             raise MigrationError(f"{database} cannot be opened. {refusal.sentence}") from error
         raise MigrationError(
             f"{database} cannot be read as a database ({error.orig}). Restore it from a backup "
@@ -148,7 +148,7 @@ def upgrade(
         except OperationalError as error:
             raise MigrationError(_OTHER_MIGRATES) from error
         if _known(config, database) == target_revision and _has_delivery(database):
-            return None  # whoever had the turn before has done it
+            return None  # the previous holder of the lock has done it
         if not held.enter_context(server.serve("")):
             raise MigrationError(_OTHERS_SERVE)
         if _known(config, database) is not None:
@@ -280,7 +280,7 @@ def _keep_private(database: Path) -> None:
     """Restrict the file to its owner, also in a shared folder; SQLite applies the umask."""
     logs = [database.with_name(database.name + end) for end in ("-wal", "-shm")]
     for path in (database, *(log for log in logs if log.exists())):
-        with contextlib.suppress(PermissionError):  # of another owner, who decides
+        with contextlib.suppress(PermissionError):  # owned by another user, who decides
             fs.keep_private(path)
 
 

@@ -27,27 +27,27 @@ from sagittal.server.storage.schema.columns import metadata
 from sagittal.server.storage.single import begin_with
 
 MAX_READERS = 45
-"""As on SQLite; PostgreSQL's own limit, 100 in all, is for all programs together."""
+"""As on SQLite; PostgreSQL's own limit, 100 in all, is shared by all programs."""
 WAIT_MS = 5000
-"""How long a writer waits for another one before it is told that the database is busy."""
+"""How long a writer waits for another before it fails as busy."""
 MIGRATION_WAIT_MS = 120_000
-"""How long a program waits for another one that migrates."""
+"""How long a program waits for another migration."""
 FORGOTTEN_S = 60
-"""A writing transaction of a frozen or unreachable program is ended after so long without a word."""
+"""A writing transaction of a frozen or unreachable program is terminated after this idle time."""
 IDLE_S = 5.0
-"""A connection that was not used for so long is asked whether it lives: the line may have broken silently."""
+"""Connections unused for this long are checked, as they may have broken silently."""
 WRITING, SERVING = 0x5A610001, 0x5A610002
-"""Numbers of the advisory locks: whoever writes, and the web server of a database; several share it."""
+"""Advisory locks: the writer, and the web server of a database; shared by several."""
 MIGRATING = 0x5A610005
-"""Of whoever migrates; the others wait."""
+"""Lock of the migrating program; others wait."""
 NODES, DUTIES = 0x5A610003, 0x5A610004
-"""First halves of those of one web server among several, and of one periodic duty."""
+"""First keys of the locks of one of several web servers, and of one periodic task."""
 FULL = ("too many clients", "remaining connection slots", "too many connections")
-"""PostgreSQL's words for a connection that it has no room for; it tells no code before one is made."""
+"""PostgreSQL's messages for lack of connections; there is no error code before connecting."""
 APPLICATION = "sagittal"
-"""How its connections are called in PostgreSQL's list of them."""
+"""Application name shown in PostgreSQL's list of connections."""
 DELIVERY_SCHEMA = "procrastinate"
-"""PostgreSQL schema of procrastinate's tables, by which job ids are delivered; no backup has them."""
+"""PostgreSQL schema of procrastinate's tables for delivering job ids; not part of backups."""
 
 
 class PostgresServer:
@@ -97,7 +97,7 @@ class PostgresServer:
                 c.exec_driver_sql(f"DROP SCHEMA IF EXISTS {DELIVERY_SCHEMA} CASCADE")
                 c.exec_driver_sql(f"CREATE SCHEMA {DELIVERY_SCHEMA}")
                 c.exec_driver_sql(f"SET LOCAL search_path TO {DELIVERY_SCHEMA}")
-                # many statements at once, which must not have parameters: SQLAlchemy would give an empty set
+                # several statements at once must not have parameters: SQLAlchemy would pass an empty set
                 c.connection.cursor().execute(SchemaManager.get_schema())
                 c.exec_driver_sql(f"COMMENT ON SCHEMA {DELIVERY_SCHEMA} IS '{version}'")
         finally:
@@ -248,18 +248,18 @@ class PostgresServer:
             "timezone": "UTC",
             "synchronous_commit": "on",
             "lock_timeout": wait_ms,
-            # a computer that is gone holds no lock for longer than a minute
+            # locks of an unreachable computer are released within a minute
             "tcp_keepalives_idle": 30,
             "tcp_keepalives_interval": 10,
             "tcp_keepalives_count": 3,
-            # what a page asks is short: compiling it costs more than it saves
+            # queries of pages are short: compiling them costs more than it saves
             "jit": "off",
             **more,
         }
         engine = create_engine(
             self._url,
             max_overflow=MAX_READERS,
-            pool_use_lifo=True,  # the one used last has what it was asked prepared
+            pool_use_lifo=True,  # the most recently used connection has prepared statements
             hide_parameters=True,
             connect_args={
                 "autocommit": True,

@@ -21,7 +21,7 @@ _WORDS = {
     Refusal.FULL: "cannot be written: the disk is full.",
     Refusal.NOT_WRITABLE: "cannot be written: the disk refuses.",
 }
-# anybody may ask, so neither names the bucket; the log does
+# publicly accessible, so neither message names the bucket; the log does
 _AWAY = "The bucket of stored files cannot be reached; see the server's log."
 _REFUSES = "The bucket of stored files refuses the server; see its log."
 
@@ -53,7 +53,7 @@ class Readiness:
 
     def checks(self) -> Mapping[str, str]:
         """Result of each check: "ok", or a sentence about the fault."""
-        # a check may wait for a bucket: who asks meanwhile gets the outcome before, and keeps no thread
+        # a check may wait for a bucket: concurrent callers get the previous result without blocking a thread
         if not self._lock.acquire(blocking=self._checked_at is None):
             return self._found
         try:

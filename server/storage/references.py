@@ -37,7 +37,7 @@ def list_referenced(c: Connection, session_id: str | None = None) -> set[tuple[s
         (session_video.c.sha256, of_session.join(session_video)),
         (report_file.c.sha256, of_session.join(signed_report).join(report_file)),
         (filter_run_file.c.sha256, of_run.join(filter_run_file)),
-        # what a run was held against stays, also when the file was replaced
+        # the reference of a run is retained, even if the file was replaced
         (filter_run.c.reference_sha256, of_run),
         (job.c.checkpoint, of_take.join(job, job.c.recording_id == recording.c.id)),
     )

@@ -12,7 +12,7 @@ from enum import StrEnum
 from sqlalchemy.exc import DBAPIError, OperationalError
 
 FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
-"""Error numbers of a file system, a quota or a file that takes no more bytes."""
+"""Error numbers of a full file system, an exceeded quota or a file size limit."""
 
 
 class Refusal(StrEnum):
@@ -36,9 +36,9 @@ _SENTENCES = {
 
 _SQLITE = {
     sqlite3.SQLITE_FULL: Refusal.FULL,
-    sqlite3.SQLITE_IOERR_SHMSIZE: Refusal.FULL,  # no room for the index of the write-ahead log
+    sqlite3.SQLITE_IOERR_SHMSIZE: Refusal.FULL,  # no space for the index of the write-ahead log
     sqlite3.SQLITE_READONLY: Refusal.NOT_WRITABLE,
-    sqlite3.SQLITE_IOERR_WRITE: Refusal.NOT_WRITABLE,  # SQLite says FULL itself for ENOSPC
+    sqlite3.SQLITE_IOERR_WRITE: Refusal.NOT_WRITABLE,  # SQLite itself reports FULL for ENOSPC
     sqlite3.SQLITE_IOERR_TRUNCATE: Refusal.NOT_WRITABLE,
 }
 
@@ -48,7 +48,7 @@ _POSTGRES = {
     "25006": Refusal.NOT_WRITABLE,  # read_only_sql_transaction: a standby
 }
 _PASSING = {"55P03", "57P01", "57P03", None}
-"""PostgreSQL's lock_not_available, admin_shutdown, cannot_connect_now; None = there is no connection."""
+"""PostgreSQL's lock_not_available, admin_shutdown, cannot_connect_now; None = no connection."""
 
 
 def is_busy(error: BaseException) -> bool:
@@ -67,7 +67,7 @@ def refusal_of(error: BaseException) -> Refusal | None:
         error = error.orig or error
     if isinstance(error, sqlite3.Error):
         code = getattr(error, "sqlite_errorcode", None)
-        # an extended code is the primary one in its lowest byte
+        # the lowest byte of an extended code is the primary code
         return None if code is None else _SQLITE.get(code) or _SQLITE.get(code & 0xFF)
     state = getattr(error, "sqlstate", None)
     if state is not None:

@@ -25,6 +25,7 @@ from sagittal.core.formats.live_log import (
     record,
     scan_records,
 )
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server.storage import fs
 
@@ -111,7 +112,10 @@ def create(path: Path, hello: bytes) -> TakeLog:
     if path.exists() and not content.startswith(_head(path, len(content))):
         raise InputError(
             "live_log_damaged",
-            f"{path.name} is there but is not a live log; it was left as it is. Begin a new take.",
+            Message(
+                "{name} is there but is not a live log; it was left as it is. Begin a new take.",
+                name=path.name,
+            ),
         )
     fs.write_file(path, content)
     return TakeLog(path, len(content))
@@ -140,8 +144,8 @@ def recover(path: Path, see: Callable[[LogRecord], None]) -> TakeLog | None:
         damage = replace(damage, original=keep_original(path))
         log.warning("%s: %s Kept as %s.", path.name, damage.sentence, damage.original)
     opened = TakeLog(path, size, damage)
-    # also when nothing is cut: what a killed process wrote may still be in memory only, and the sender is
-    # about to be told that it is kept
+    # even if nothing is truncated: data of a killed process may be in memory only, and will now be
+    # acknowledged as durable
     try:
         opened.drop_unsynced()
         fs.sync_folder(path.parent)
@@ -224,4 +228,4 @@ def read_open_records(file: BinaryIO, start: int = 0) -> Iterator[tuple[int, Log
             yield start + one.end, one
         start, unread = start + used, unread[used:]
         if len(unread) >= _LONGEST:
-            return  # a whole record would have fitted: it is damaged
+            return  # a complete record would have fitted: it is damaged

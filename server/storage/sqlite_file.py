@@ -19,9 +19,9 @@ from sqlalchemy.pool import ConnectionPoolEntry
 from sagittal.server.storage.single import begin_with
 
 MAX_READERS = 45
-"""Connections beyond the five that are kept open: more than a web process has threads."""
+"""Connections in addition to the five kept open: more than a web process has threads."""
 BUSY_TIMEOUT_MS = 5000
-"""How long a writer waits for another one before SQLITE_BUSY."""
+"""How long a writer waits for another before SQLITE_BUSY."""
 
 
 class SqliteFile:
@@ -100,18 +100,18 @@ class SqliteFile:
         return sqlite3.connect(self.path, timeout=timeout, isolation_level=None, check_same_thread=False)
 
     def _engine(self, *, begin: str, query_only: bool = False, foreign_keys: bool = True) -> Engine:
-        # hide_parameters: an error's text goes to the log, and its parameters may be a patient's
+        # hide_parameters: error texts are logged, and parameters may contain patient data
         engine = create_engine(
             f"sqlite:///{self.path}",
             max_overflow=MAX_READERS,
-            pool_use_lifo=True,  # the one used last has the pages of the database at hand
+            pool_use_lifo=True,  # the most recently used connection has cached pages
             connect_args={"timeout": BUSY_TIMEOUT_MS / 1000},
             hide_parameters=True,
         )
 
         @event.listens_for(engine, "connect")
         def _prepare(connection: DBAPIConnection, entry: ConnectionPoolEntry) -> None:
-            # None: the driver starts no transactions of its own
+            # None: the driver starts no transactions itself
             connection.isolation_level = None
             _set_pragmas(connection, query_only, foreign_keys)
 

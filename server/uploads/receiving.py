@@ -14,6 +14,7 @@ from typing import Final, Self
 from sqlalchemy import Connection
 
 from sagittal.core.errors import InputError
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.errors import ServiceError, TooLarge
 from sagittal.server.settings import Settings
@@ -92,13 +93,21 @@ def check_set(c: Connection, settings: Settings, session_id: str, name: str, siz
     this = current(c, session_id)
     siblings = [f for f in this.files if f.name != name] if this else []
     if len(siblings) + 1 > settings.max_files:
-        raise TooLarge("too_many_files", f"A recording has at most {settings.max_files} files.")
+        raise TooLarge(
+            "too_many_files",
+            Message("A recording has at most {max_files} files.", max_files=settings.max_files),
+        )
     total = sum(f.size for f in siblings) + size
     if total > settings.max_set_bytes:
         raise TooLarge(
             "set_too_large",
-            f"With '{name}' the recording has {total / 1e6:.0f} MB, "
-            f"at most {settings.max_set_bytes / 1e6:g} MB are allowed. Remove files first.",
+            Message(
+                "With '{name}' the recording has {total:.0f} MB, at most {max_set_bytes:g} MB are "
+                "allowed. Remove files first.",
+                name=name,
+                total=total / 1e6,
+                max_set_bytes=settings.max_set_bytes / 1e6,
+            ),
         )
 
 
@@ -106,8 +115,12 @@ def make_too_large(name: str, limit: int) -> TooLarge:
     """Error for a file that exceeds the size limit in bytes."""
     return TooLarge(
         "file_too_large",
-        f"'{name}' is larger than {limit / 1e6:g} MB, the limit of this installation. "
-        "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+        Message(
+            "'{name}' is larger than {limit:g} MB, the limit of this installation. Split the "
+            "recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+            name=name,
+            limit=limit / 1e6,
+        ),
     )
 
 
@@ -143,8 +156,8 @@ def check_name(name: str) -> str:
 
 
 def _unprintable(name: str) -> bool:
-    # control characters, lone surrogates, marks that turn the direction of writing and so show another
-    # ending, and what stands for bytes that were no text; joiners stay, emoji are made of them
+    # control characters, lone surrogates, marks that reverse the text direction and disguise the extension,
+    # and stand-ins for undecodable bytes; joiners are kept, as emoji need them
     return any(
         unicodedata.category(c) in {"Cc", "Cs"}
         or unicodedata.bidirectional(c) in _TURNING

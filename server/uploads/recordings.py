@@ -107,7 +107,7 @@ def set_manifest(
     if this.manifest != manifest:
         values: dict[str, Any] = {"manifest": manifest}
         if _sources(this.manifest) != _sources(manifest):
-            values["inspection"] = None  # the files will be read in another way
+            values["inspection"] = None  # the files will be read differently
         c.execute(update(recording).where(recording.c.id == this.id).values(values))
         audit.record(c, actor, "recording.mapped", "recording", this.id, {"session_id": session_id})
     return get(c, this.id)
@@ -131,7 +131,7 @@ def inspect(c: Connection, queue: JobQueue, actor: audit.Actor | None, session_i
     this = require_current(c, session_id)
     if this.inspection is not None and this.job is not None and this.job.state == "done":
         return this.job
-    # a set that was changed and changed back has been looked at, but what was found has been dropped
+    # a set that was changed and changed back has been inspected, but the results were dropped
     earlier = select(func.count()).select_from(job).where(job.c.recording_id == this.id)
     times = c.execute(earlier.where(job.c.kind == INSPECT, job.c.state == "done")).scalar_one()
     declared = hashlib.sha256(repr(_sources(this.manifest)).encode()).hexdigest()[:16]

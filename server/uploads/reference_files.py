@@ -9,6 +9,7 @@ from typing import Final
 
 from sqlalchemy import Connection, delete, func, insert, select
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, TooLarge
@@ -18,7 +19,7 @@ from sagittal.server.uploads.receiving import receive
 from sagittal.server.uploads.recordings import RecordedFile
 
 MOST_FILES: Final = 20
-"""References of a session (our choice)."""
+"""References per session (our choice)."""
 
 
 def list_files(c: Connection, session_id: str) -> list[RecordedFile]:
@@ -60,7 +61,10 @@ class receive_reference(receive):  # noqa: N801 - as `receive`
         c.execute(delete(reference_file).filter_by(**key))
         mine = reference_file.c.session_id == self._session_id
         if c.execute(select(func.count()).select_from(reference_file).where(mine)).scalar_one() >= MOST_FILES:
-            raise TooLarge("too_many_files", f"A visit has at most {MOST_FILES} references; remove one.")
+            raise TooLarge(
+                "too_many_files",
+                Message("A visit has at most {MOST_FILES} references; remove one.", MOST_FILES=MOST_FILES),
+            )
         c.execute(insert(reference_file).values(**key, size=blob.size, sha256=blob.sha256, added_at=now()))
         detail = {"session_id": self._session_id, "sha256": blob.sha256, "size": blob.size}
         audit.record(c, self._actor, "reference.added", "session", self._session_id, detail)

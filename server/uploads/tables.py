@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from sagittal.core.formats.table_guess import TableLook
 
 MOST_EARLIER: Final = 200
-"""Earlier recordings that are looked through for a table of the same shape, the newest first."""
+"""Earlier recordings searched for a table of the same shape, newest first."""
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.errors import Conflict, NotFound, ServiceError, TooLarge
 from sagittal.server.settings import Settings
@@ -26,7 +27,7 @@ from sagittal.server.uploads import receiving, recordings
 from sagittal.server.uploads.recordings import RecordedFile
 
 ABANDONED: Final = dt.timedelta(days=1)
-"""An upload to which nothing was added for so long goes."""
+"""Uploads idle for longer than this are deleted."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,9 @@ def begin(
     """
     name = receiving.check_name(name)
     if size < 1:
-        raise ServiceError("bad_value", f"The file has {size} bytes; an upload in parts has at least 1.")
+        raise ServiceError(
+            "bad_value", Message("The file has {size} bytes; an upload in parts has at least 1.", size=size)
+        )
     if size > settings.max_file_bytes:
         raise receiving.make_too_large(name, settings.max_file_bytes)
     with db.write() as c:
@@ -73,7 +76,10 @@ def begin(
                 return one
             reserved += one.size
         if len(coming) >= settings.max_files:
-            raise TooLarge("too_many_files", f"At most {settings.max_files} files can be uploaded at a time.")
+            raise TooLarge(
+                "too_many_files",
+                Message("At most {max_files} files can be uploaded at a time.", max_files=settings.max_files),
+            )
         receiving.check_set(c, settings, session_id, name, size + reserved)
         receiving.require_room(blobs, settings, size)
         fresh = new_id()
@@ -114,12 +120,21 @@ def add_part(
             this = get(c, blobs, session_id, upload_id)
         if offset != this.offset:
             raise Conflict(
-                "upload_gap", f"Received bytes from {offset}, expected bytes from {this.offset}. Send those."
+                "upload_gap",
+                Message(
+                    "Received bytes from {offset}, expected bytes from {offset2}. Send those.",
+                    offset=offset,
+                    offset2=this.offset,
+                ),
             )
         if offset + len(data) > this.size:
             raise TooLarge(
                 "file_too_large",
-                f"'{this.name}' was announced with {this.size} bytes but more arrived. Start over.",
+                Message(
+                    "'{name}' was announced with {size} bytes but more arrived. Start over.",
+                    name=this.name,
+                    size=this.size,
+                ),
             )
         if not data:
             return this
@@ -166,23 +181,31 @@ def finish(
             )
         if this.offset < this.size:
             raise Conflict(
-                "upload_incomplete", f"{this.offset} of {this.size} bytes received. Send the rest first."
+                "upload_incomplete",
+                Message(
+                    "{offset} of {size} bytes received. Send the rest first.",
+                    offset=this.offset,
+                    size=this.size,
+                ),
             )
         if _hash(path) != sha256:
             fs.remove_file(path)
             raise Conflict(
                 "upload_damaged",
-                f"The SHA-256 of the received '{this.name}' differs from the sent one. Send it again from 0.",
+                Message(
+                    "The SHA-256 of the received '{name}' differs from the sent one. Send it again from 0.",
+                    name=this.name,
+                ),
             )
         with db.read() as c:
             space = recordings.patient_of(c, session_id)
             receiving.check_set(c, settings, session_id, this.name, this.size)
-        # before the transaction: into a bucket it takes a while
+        # before the transaction: uploading to a bucket takes a while
         blobs.adopt(space, path, sha256)
         try:
             stored = _publish(db, blobs, settings, actor, session_id, this, sha256)
         except NotFound:
-            # erased meanwhile: nothing of it may wait, in the trash neither
+            # erased in the meantime: nothing of it may remain, not even in the trash
             fs.remove_file(path)
             references.discard(db, blobs, space, [sha256])
             raise

@@ -13,6 +13,7 @@ from typing import Final
 
 from sqlalchemy import Connection, delete, insert, select, update
 
+from sagittal.core.message import Message
 from sagittal.server import audit
 from sagittal.server.clinic import sessions
 from sagittal.server.errors import NotFound, ServiceError
@@ -22,7 +23,7 @@ from sagittal.server.uploads.receiving import receive
 from sagittal.server.uploads.recordings import RecordedFile
 
 BEGINS: Final = 12
-"""Bytes that tell what a file is."""
+"""Number of initial bytes that identify the type of a file."""
 
 MOST_OFFSET_S: Final = 24 * 3600.0
 
@@ -75,7 +76,10 @@ def align(c: Connection, actor: audit.Actor | None, session_id: str, offset_s: f
     get(c, session_id)
     if offset_s is not None and not (isfinite(offset_s) and abs(offset_s) <= MOST_OFFSET_S):
         raise ServiceError(
-            "bad_value", f"The offset is {offset_s} s; expected at most one day in either direction."
+            "bad_value",
+            Message(
+                "The offset is {offset_s} s; expected at most one day in either direction.", offset_s=offset_s
+            ),
         )
     c.execute(update(session_video).where(session_video.c.session_id == session_id).values(offset_s=offset_s))
     audit.record(c, actor, "video.aligned", "session", session_id, {"offset_s": offset_s})
@@ -126,7 +130,10 @@ class receive_video(receive):  # noqa: N801 - as `receive`
         if find_media_type(self._begins) is None:
             raise ServiceError(
                 "no_video",
-                f"'{self._name}' is not a video that browsers can play. Expected MP4, QuickTime or WebM.",
+                Message(
+                    "'{name}' is not a video that browsers can play. Expected MP4, QuickTime or WebM.",
+                    name=self._name,
+                ),
             )
         return super().keep()
 

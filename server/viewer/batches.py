@@ -17,18 +17,19 @@ from sagittal.server.viewer.steps import Single
 from sagittal.server.viewer.viser_adapter import move_copies
 
 PALE: Final = 0.5
-"""Opacity of another walk laid over the figure."""
+"""Opacity of a ghost."""
 
 FAINT: Final = 0.35
-"""Opacity of a part that no sensor supports."""
+"""Opacity of a part without a sensor."""
 
 ARMS: Final = 0.2
-"""Opacity of the arms, which nothing measures; fainter, since seen from the side they cross a thigh."""
+"""Opacity of the arms, which are never measured; fainter, since they cross a thigh in side view."""
 
 RAISED_M: Final = 1.0
-"""Height of the origins of see-through nodes over that of the floor. The browser draws such nodes from far
-to near by their origins, and each hides what is drawn later behind it: at the floor's height they would cut
-holes into its lines."""
+"""Height of the origins of transparent nodes above that of the floor. The browser draws such nodes from far
+to near by their origins, and each hides later ones: at the floor's height they would cut holes into its
+lines.
+"""
 
 
 class DrawnBatch:

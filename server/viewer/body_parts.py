@@ -26,13 +26,13 @@ PartName = Literal[
 ]
 
 _BALL: Final = 0.45
-"""Where the toes bend, of the foot's length in front of the ankle."""
+"""Position of the toe bend, in foot lengths anterior to the ankle."""
 
 _KNUCKLE: Final = 0.27
-"""Half the foot's thickness there, of the ankle's height."""
+"""Half the thickness of the foot there, in ankle heights."""
 
 _TIP: Final = 0.75
-"""End of the toes, of the foot's length in front of the ankle."""
+"""End of the toes, in foot lengths anterior to the ankle."""
 
 _MOST_BEND: Final = np.deg2rad(65.0)
 
@@ -73,7 +73,7 @@ def make_ring(body: BodyModel, start: float, end: float, lift: float = 0.0012) -
 def make_foot(body: BodyModel, side: int) -> Mesh:
     """Return a foot (side: 1 right, −1 left) from heel to ball; the flat of its sole is at −ankle height."""
     r = _stature(body) / 1000
-    # the shank turns in a dome about the ankle centre
+    # the shank rotates in a dome about the ankle centre
     u = np.linspace(-np.pi / 2, np.pi / 2, 8)[1:-1]
     widths = np.cos(u)[:, None] * (np.array([17.6, 17.6, 18.2]) * r)
     dome = loft_sections(np.column_stack((17.6 * r * np.sin(u), 0 * u, widths)), 12, (2.0 * r, 2.0 * r))
@@ -101,7 +101,7 @@ def find_toe_bend(body: BodyModel, pitch: Floats, height: Floats) -> Floats:
     pitch : of the foot, rad, toes up. height : of the ball above the floor, m.
     """
     along, under = (_TIP - _BALL - 0.05) * body.foot, _KNUCKLE * body.ankle_height
-    # of a moment np.clip alone would take as long as all else
+    # for a single frame np.clip alone would take as long as everything else
     low = np.minimum(np.maximum(height / hypot(along, under), -1.0), 1.0)
     least = atan2(under, along) - np.arcsin(low) - pitch
     return np.asarray(np.minimum(np.maximum(least, 0.0), _MOST_BEND))
@@ -155,7 +155,7 @@ def _loft_foot(body: BodyModel, side: int, bounds: tuple[float, float], rings: i
     sides = (out, inn) if side > 0 else (inn, out)
     knuckle = _KNUCKLE * body.ankle_height
     caps = (0.0, knuckle) if bounds[0] < 0 else (knuckle, 0.0)
-    # sections stand across x: what is forward in a loft is up here; squarer below, so that the sole is flat
+    # sections are perpendicular to x: forward in a loft is up here; squarer below, for a flat sole
     sections = np.stack((x, (top + bottom) / 2, half, half, *sides), axis=1)
     v, f = loft_sections(sections, 18, caps, power=(2.0, 4.5))
     v = v[:, [1, 0, 2]].astype(np.float64)

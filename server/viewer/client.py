@@ -26,7 +26,7 @@ from sagittal.server.viewer.viser_adapter import read_client
 log = logging.getLogger(__name__)
 
 QUALITY: Final = 10
-"""Of brotli: 9 packs 7 % worse, 11 takes twice the time for 2 %."""
+"""Brotli quality: 9 compresses 7 % less, 11 takes twice the time for 2 %."""
 
 _HIDE_PANEL = "<style>.mantine-Paper-root,.mantine-Notifications-root{display:none!important}</style>"
 _BEGIN = """<script>{
@@ -46,8 +46,9 @@ _BEGIN = """<script>{
     return context;
   };
 }</script>"""
-"""Before viser's scripts. The page is the same for all views; its client asks for the pipe at its address and
-is dark at once if the hash says so. Of what is drawn in copies (batches.py) the figure is first.
+"""Inserted before viser's scripts. The page is the same for all views; its client connects to the relay at
+its address and is dark from the start if the hash requests it. Of all instanced meshes (batches.py) the
+avatar is first.
 """
 
 _QUIET = """<script>{
@@ -57,11 +58,10 @@ _QUIET = """<script>{
   const warn = console.warn;
   console.warn = (...all) => String(all[0]).startsWith("THREE.Clock:") || warn(...all);
 }</script>"""
-"""Before viser's scripts: what they need not do here, and would log errors or warnings for.
-
-The client loads a WebAssembly module that sorts Gaussian splats, whose bindings (Emscripten's embind) call
-`Function` on strings. We show no splats: the module is never loaded, so the policy of the page need not allow
-`unsafe-eval`, and nothing is refused. The deprecation of `THREE.Clock` concerns viser's developers only.
+"""Inserted before viser's scripts: disables features not needed here that would log errors or warnings. The
+client loads a WebAssembly module that sorts Gaussian splats, whose bindings (Emscripten's embind) call
+`Function` on strings. We show no splats: the module is never loaded, so the page's policy need not allow
+`unsafe-eval`. The deprecation of `THREE.Clock` concerns viser's developers only.
 """
 
 _PACKED = re.compile(r'<script data-p="([^"]*)" data-ss="(\d+)" data-cs="(\d+)">')

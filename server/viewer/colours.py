@@ -24,13 +24,12 @@ TINTS: Final[Mapping[bool, Mapping[Tint, Rgb]]] = {
         "ring": (0x0E, 0x3A, 0x57),
     },
 }
-"""Dark → colours of the parts; the leg pairs are --left and --right of the page's base.css.
-
-Two rings around the right shank tell the sides where colours do not.
+"""Dark → colours of the parts; the leg pairs are --left and --right of the page's base.css. Two rings around
+the right shank distinguish the sides without colour.
 """
 
 GHOST: Final[Mapping[bool, Rgb]] = {False: (0x5B, 0x7C, 0x99), True: (0x8F, 0xAE, 0xC8)}
-"""Dark → colour of another visit, the grey-blue of its curves; legs are told by where they are."""
+"""Dark → colour of a ghost, the grey-blue of its curves; its legs are distinguished by position."""
 
 BACKGROUND: Final[Mapping[bool, Rgb]] = {False: (0xF9, 0xFA, 0xFB), True: (0x16, 0x1C, 0x22)}
 """Dark → colour behind the figure."""

@@ -24,20 +24,20 @@ from sagittal.server.viewer.room import FOV_RAD, CameraShot, frame_person
 from sagittal.server.viewer.shapes import Mesh, make_footprint
 
 HEIGHT: Final = 500
-"""Units of the drawing from the top of the picture to its bottom; how wide the picture is does not matter."""
+"""Height of the drawing in units; the width of the picture is arbitrary."""
 
 SHADOW: Final = np.array([-0.2, -0.2])
-"""Where the shadow of what is 1 m above the floor falls, m: viser's own lamp, in the axes of the room."""
+"""Position of the shadow of a point 1 m above the floor, m: viser's own lamp, in room axes."""
 
 LINES_M: Final = 7
-"""Lines of the floor are drawn as far to each side of the person."""
+"""Extent of the floor lines to each side of the person."""
 
 _NEAREST_M: Final = 0.6
 _EVERY: Final = 2
-"""Of so many pieces of a trail one is drawn."""
+"""One in this many segments of a trail is drawn."""
 
 _OFF: Final = 0.7
-"""Units that a line may miss a point by."""
+"""Tolerance of line simplification in units."""
 
 _DEFS: Final = (
     "<defs>"
@@ -47,7 +47,7 @@ _DEFS: Final = (
     + '<linearGradient id="fp-far" gradientUnits="userSpaceOnUse" x1="0" x2="0" y1="-60" y2="250">'
     '<stop stop-opacity="0"/><stop offset="1"/></linearGradient></defs>'
 )
-"""The lamp shines from above and ahead, and the floor ends in the distance."""
+"""The lamp shines from above and ahead, and the floor fades in the distance."""
 _CSS: Final[dict[Tint, str]] = {"left": "fp-l", "right": "fp-r", "body": "fp-b", "ring": "fp-g"}
 
 

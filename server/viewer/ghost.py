@@ -24,13 +24,13 @@ from sagittal.server.viewer.reference import SEGMENTS, ReferenceWalk
 from sagittal.server.viewer.steps import Single
 
 SPAN_S: Final = 1.0
-"""The way of the person over this time says where the walk goes: about a stride, so that sway does not."""
+"""Time over which the path gives the walking direction: about one stride, to average out sway."""
 
 PHASES: Final = 100
-"""Steps of phase in which a walk made of curves is shown, as many as its curves have."""
+"""Phase steps of a walk defined by curves, as many as its curves have."""
 
 STANDS_M: Final = 0.15
-"""A shorter way in that time has no direction; on a treadmill the facing of the beginning stands for it."""
+"""A shorter path in that time has no direction; on a treadmill the initial heading is used instead."""
 
 
 def match_ghost(
@@ -62,7 +62,7 @@ def match_reference(figure: ReplayMotion, strides: Strides, walk: ReferenceWalk)
     frames = np.where((steps >= 0).any(axis=1), frames.reshape(-1), -1)
     if not (frames >= 0).any():
         return None
-    # each pair of phases is posed once, whatever the length of the take
+    # each pair of phases is posed once, independent of the length of the trial
     posed = [
         walk.at(
             {side: k / PHASES if k >= 0 else None for side, k in zip(SIDES, pair, strict=True)},

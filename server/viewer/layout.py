@@ -25,10 +25,10 @@ from sagittal.server.viewer.steps import Single
 _WORN: Mapping[str, tuple[Segment, ...]] = {
     method: e.sensors for method, e in BY_METHOD.items() if e.sensors is not None
 }
-"""Method → segments whose sensors it uses, where it gives poses of others too."""
+"""Method → instrumented segments, if it also estimates poses of others."""
 
 Carrier = Segment | Literal["trunk", "toes_l", "toes_r"]
-"""What a part hangs on: a segment, the trunk over the pelvis, or toes that the floor bends."""
+"""Carrier of a part: a segment, the trunk above the pelvis, or toes bent by the floor."""
 
 _TOES: Final[Mapping[Side, Carrier]] = {"left": "toes_l", "right": "toes_r"}
 
@@ -43,18 +43,18 @@ _PARTS: Final[Mapping[PartName, tuple[tuple[Carrier, Tint], ...]]] = {
     "toes_r": (("toes_r", "right"),),
     "pelvis": (("pelvis", "body"),),
     "trunk": (("trunk", "body"),),
-    # two rings tell the right leg where colours do not
+    # two rings mark the right leg without colour
     "rings": (("shank_r", "ring"),),
     "arms": (("trunk", "body"),),
 }
-"""Mesh → carriers and colours of its copies."""
+"""Mesh → carriers and colours of its instances."""
 
 _NOT_GHOSTLY: Final = frozenset[PartName]({"trunk", "rings", "arms"})
 
 _NEUTRAL: Final = rotation.from_matrix(R_NEUTRAL)
 _NEUTRAL_TURNED: Final = rotation.multiply(rotation.about(2, np.pi), _NEUTRAL)
 _SOLE: Final = 0.25
-"""Middle of the sole, of the foot's length in front of the ankle."""
+"""Middle of the sole, in foot lengths anterior to the ankle."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class FigureLayout:
             for name, all_copies in _PARTS.items()
             if (copies := tuple(x for x in all_copies if _HANGS.get(x[0], x[0]) in segments))
         }
-        # carriers in the order of `place`: segments, the trunk, toes
+        # carriers in the order of `place`: segments, trunk, toes
         trunk: tuple[Carrier, ...] = ("trunk",) if "pelvis" in segments else ()
         carriers = (*self.segments, *trunk, *(_TOES[side] for side in self._feet))
         self._of_feet = [self.segments.index(FOOT[side]) for side in self._feet]
@@ -124,20 +124,20 @@ class FigureLayout:
         self.copies: Mapping[PartName, slice] = {
             name: slice(a, b) for name, a, b in zip(self._parts, [0, *ends], ends, strict=False)
         }
-        """Mesh → its copies among those of all meshes."""
+        """Mesh → indices of its instances among those of all meshes."""
 
     def place(self, q: Floats, p: Floats) -> PlacedFigure:
         """Place all parts; q (m, s, 4) and p (m, s, 3) of the segments of this layout."""
         turns, places = [q], [p]
         if "pelvis" in self.segments:
             pelvis = _column(self.segments.index("pelvis"))
-            # a chest carries its parts as it is turned, a heading only knows where the front is
+            # parts of the chest follow its orientation; otherwise only the heading is known
             chest = _column(self.segments.index("chest")) if "chest" in self.segments else None
             turns.append(_stand_up(q[:, pelvis]) if chest is None else q[:, chest])
             places.append(p[:, pelvis])
         soles: dict[Side, Single] = {}
         if self._feet:
-            # (m, feet, 4) and of each foot two points: both feet at once
+            # (m, feet, 4) and two points per foot: both feet at once
             foot = q[:, self._of_feet]
             matrices = find_matrices(foot)
             points = p[:, self._of_feet, None] + self._points @ matrices.swapaxes(-1, -2)
@@ -148,7 +148,7 @@ class FigureLayout:
             middles = points[:, :, 1].astype(np.float32)
             soles = {side: middles[:, k] for k, side in enumerate(self._feet)}
         return PlacedFigure(
-            # `take` lays the copies of a mesh side by side in memory
+            # `take` makes the instances of a mesh contiguous in memory
             np.concatenate(turns, axis=1, dtype=np.float32).take(self._of_copies, axis=1),
             np.concatenate(places, axis=1, dtype=np.float32).take(self._of_copies, axis=1),
             soles,

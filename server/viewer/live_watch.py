@@ -23,7 +23,7 @@ from sagittal.server.viewer.live.moment import FigureMoment
 log = logging.getLogger(__name__)
 
 TICK_S: Final = 0.1
-"""How often silence is looked for."""
+"""Interval of checks for silence."""
 
 
 class FeedFrame(msgspec.Struct, frozen=True):
@@ -94,7 +94,7 @@ class LiveWatch:
             if not self._failed:
                 log.exception("the live figure of take %s could not be shown", picture.take)
             self._failed = True
-            self._at = -np.inf  # what is still seen is not now
+            self._at = -np.inf  # the displayed pose is no longer current
 
     def _pose(self, picture: Picture) -> None:
         if picture.take != self._take:

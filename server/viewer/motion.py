@@ -27,7 +27,7 @@ FRAME_RATE = 50.0
 """Frames kept per second; the page asks for about 30."""
 
 ROOT_WINDOW_S = 1.2
-"""The view follows the root averaged over about one stride: sway stays visible, the walk stays in view."""
+"""The view follows the root averaged over about one stride: sway remains visible, the walk stays in view."""
 
 GhostName = Literal["visit", "norm", "left", "right"]
 """Another visit, the norm at this speed, or the mean of one side for both legs."""
@@ -36,10 +36,10 @@ LOWER_BODY: Final[tuple[Segment, ...]] = (
     "pelvis",
     *(s[side] for side in SIDES for s in (THIGH, SHANK, FOOT)),
 )
-"""What a whole figure is made of."""
+"""Segments of a complete avatar."""
 
 FOR_THE_EYE = frozenset(e.method for e in BY_METHOD.values() if not e.in_room)
-"""Methods whose positions say nothing about where the person was in the room."""
+"""Methods whose positions are for illustration only."""
 
 
 @dataclass(frozen=True, eq=False)

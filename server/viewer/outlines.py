@@ -14,7 +14,8 @@ def split_surfaces(mesh: Mesh) -> Iterator[Mesh]:
     """Yield each closed surface of a mesh as a mesh."""
     vertices, faces = mesh
     surface, previous = np.arange(len(vertices)), None
-    while previous is None or (surface != previous).any():  # each vertex takes the least number of its faces
+    # each vertex takes the smallest label of its faces
+    while previous is None or (surface != previous).any():
         previous = surface
         surface = surface.copy()
         np.minimum.at(surface, faces, previous[faces].min(axis=1)[:, None])

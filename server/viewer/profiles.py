@@ -28,7 +28,7 @@ THIGH: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: 0 hip centre, 1 knee centre. The quadriceps in front, highest in the upper third."""
+"""Position: 0 hip centre, 1 knee centre. Quadriceps in front, thickest in the upper third."""
 
 SHANK: Final[Floats] = np.array(
     [
@@ -44,7 +44,7 @@ SHANK: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: 0 knee centre, 1 ankle centre. Straight shin, calf behind, malleoli at the end."""
+"""Position: 0 knee centre, 1 ankle centre. Straight shin, calf at the back, malleoli at the end."""
 
 FOOT: Final[Floats] = np.array(
     [
@@ -66,8 +66,9 @@ FOOT: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Other columns. Place: along the foot, heel −250, toes 750, thousandths of its length; top and bottom, in
-thousandths of the ankle's height (−1000: the floor); reach outwards and inwards, of the length."""
+"""Different columns. Position: along the foot, heel −250, toes 750, thousandths of its length; top and
+bottom, in thousandths of the ankle height (−1000: the floor); extent outwards and inwards, of the length.
+"""
 
 PELVIS: Final[Floats] = np.array(
     [
@@ -82,7 +83,7 @@ PELVIS: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: above the hip centres. Cut high at the sides, so that the thighs show up to the hips."""
+"""Position: above the hip centres. Cut high at the sides, so that the thighs are visible up to the hips."""
 
 TRUNK: Final[Floats] = np.array(
     [
@@ -106,7 +107,7 @@ TRUNK: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: above the hip centres. Waist, ribcage, shoulders, neck; both ends are hidden."""
+"""Position: above the hip centres. Waist, ribcage, shoulders, neck; both ends are hidden."""
 
 HEAD: Final[Floats] = np.array(
     [
@@ -124,7 +125,7 @@ HEAD: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: above the hip centres. Chin, jaw, face, crown."""
+"""Position: above the hip centres. Chin, jaw, face, crown."""
 
 ARM: Final[Floats] = np.array(
     [
@@ -143,7 +144,7 @@ ARM: Final[Floats] = np.array(
     ],
     np.float64,
 )
-"""Place: below the shoulder centre; elbow at 186, wrist at 332, finger tips at 440."""
+"""Position: below the shoulder centre; elbow at 186, wrist at 332, finger tips at 440."""
 
 SHOULDER: Final = (-2.0, 258.0, 102.0)
-"""Centre of the right shoulder: forward of, over and beside the middle of the hips."""
+"""Centre of the right shoulder: forward, up and right of the middle of the hips."""

@@ -73,14 +73,13 @@ CONTENT_POLICY = (
     "style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'self' data:; "
     "frame-ancestors 'self'"
 )
-"""What viser's single-file client needs, and nothing from elsewhere.
-
-`wasm-unsafe-eval` compiles the zstd decoder that unpacks the client and its messages; `blob:` is the worker
-that holds the websocket. Strings are never evaluated (`client.py` keeps the one module that would out).
+"""Policy required by viser's single-file client, without external resources. `wasm-unsafe-eval` compiles the
+zstd decoder for the client and its messages; `blob:` is the worker that holds the websocket. Strings are
+never evaluated (`client.py` disables the one module that would).
 """
 
 _GONE = 4404
-"""Close code: the view is not there (any more); the page around should connect again."""
+"""Close code: the view does not exist (any more); the embedding page should reconnect."""
 
 _SWITCHES: Mapping[str, Callable[[ReplayFigure, bool], None]] = {
     "dark": ReplayFigure.set_dark,
@@ -219,7 +218,7 @@ async def _open(
             this = _replayable(c, sid)
             if this is None or overlay_id is None:
                 return this, None, patient
-            comparisons.pair(c, sid, overlay_id)  # refuses a visit of somebody else
+            comparisons.pair(c, sid, overlay_id)  # rejects a visit of another patient
             return this, _replayable(c, overlay_id), patient
 
     def why_nothing() -> str:
@@ -274,7 +273,7 @@ async def _follow(
     """Send the view's id, then pose the avatar for every {"t"} and reply with the time shown."""
     try:
         await ws.send_json(answer)
-    except WebSocketDisconnect:  # the page was left while the view was being opened
+    except WebSocketDisconnect:  # the page was left while the view was opening
         return
     while True:
         try:

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from sagittal.core.body.poses import Poses
 
 RATE_HZ: Final = 25.0
-"""Pictures a second, as films have."""
+"""Frames per second, as in films."""
 
 TITLE: Final = ("<title>Viser</title>", "<title>Sagittal</title>")
-"""What the client calls itself, and what the file is called: nothing of whose walk it is."""
+"""Title of the client and name of the file, without patient data."""
 
 
 def write_walk(content: ExportContent) -> bytes:
@@ -29,7 +29,7 @@ def write_walk(content: ExportContent) -> bytes:
 
 def record_walk(poses: Poses) -> bytes:
     """Draw a walk frame by frame, followed from the right, with footprints and trails."""
-    # a worker that draws nothing does without viser
+    # a worker that draws nothing does not import viser
     from sagittal.server.viewer.client import silence
     from sagittal.server.viewer.motion import prepare_motion
     from sagittal.server.viewer.replay.replay_figure import ReplayFigure

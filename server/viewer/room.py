@@ -18,9 +18,9 @@ from sagittal.server.viewer.colours import BACKGROUND, FLOOR
 from sagittal.server.viewer.viser_adapter import gather_longer, move_node
 
 ROOM: Final = "/room"
-"""Name of the node that everything hangs on."""
+"""Name of the parent node of everything."""
 SKY: Final = "/sky"
-"""Name of the light that comes from everywhere."""
+"""Name of the ambient light."""
 
 ViewName = Literal["near", "right", "left", "front", "top"]
 
@@ -31,10 +31,11 @@ VIEWS: Final[Mapping[ViewName, Vector]] = {
     "right": (0.0, -4.0, 0.92),
     "left": (0.0, 4.0, 0.92),
     "front": (4.0, 0.0, 1.0),
-    # straight from above there is no upwards in the picture; behind, so that the walk goes up in it
+    # straight from above there is no upward direction in the picture; from behind, so that the walk goes up
+    # in it
     "top": (-0.6, 0.0, 5.0),
 }
-"""From where a person who faces x is looked at, m; "near" is from the right and slightly from ahead."""
+"""Camera positions for a person facing x, m; "near" is from the right and slightly from ahead."""
 
 FOV_RAD: Final = float(np.deg2rad(31.0))
 FLOOR_M: Final = 60.0
@@ -67,8 +68,8 @@ class SceneRoom:
         scene.set_up_direction("+z")
         scene.world_axes.visible = False
         scene.configure_default_lights(True, cast_shadow=True)
-        # light from all around is one lamp: the default, a picture of a surrounding, must be filtered by the
-        # browser first, three quarters of the work of a first picture without a graphics processor
+        # ambient light is one lamp: the default, an environment map, must first be filtered by the browser,
+        # three quarters of the work of a first frame without a graphics processor
         scene.configure_environment_map(None)
         scene.add_light_hemisphere(
             SKY, sky_color=(255, 255, 255), ground_color=(200, 200, 205), intensity=2.4

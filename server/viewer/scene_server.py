@@ -19,7 +19,7 @@ from sagittal.core.errors import EstimationError
 from sagittal.server.viewer.viser_adapter import forbid_sharing
 
 LONGEST_PATH_BYTES: Final = 100
-"""A socket's path has at most 108 bytes on Linux, 104 elsewhere; viser waits for ever for a longer one."""
+"""A socket path has at most 108 bytes on Linux, 104 elsewhere; viser waits forever for a longer one."""
 
 
 def start_scene_server() -> viser.ViserServer:
@@ -30,7 +30,7 @@ def start_scene_server() -> viser.ViserServer:
     EstimationError
         `no_place_for_views`: the folder for temporary files cannot be written, or its path is too long.
     """
-    # viser prints a banner per server even when told not to be verbose
+    # viser prints a banner per server even if not verbose
     rich.get_console().quiet = True
     try:
         folder = Path(tempfile.mkdtemp(prefix="sagittal-view-"))
@@ -53,7 +53,7 @@ def socket_of(server: viser.ViserServer) -> Path:
 def stop_scene_server(server: viser.ViserServer) -> None:
     """Stop a scene server and remove its folder."""
     server.stop()
-    # what cleans temporary files may have been here before
+    # temporary files may have been cleaned up
     with contextlib.suppress(FileNotFoundError):
         shutil.rmtree(socket_of(server).parent)
 

@@ -12,17 +12,18 @@ from sagittal.core.frames import Bools, Floats
 from sagittal.core.signals.rest import find_runs
 
 PIECE_M = 0.05
-"""A trail is drawn in pieces of about this length: some 30 per stride, none while the foot stands."""
+"""Length of the segments of a trail: some 30 per stride, none while the foot is stationary."""
 
 CLEAR_M = 0.003
-"""How far prints and trails keep above the floor, so that neither hides in it."""
+"""Height of footprints and trails above the floor, so that neither is hidden."""
 
 REST_MPS = 0.2
-"""Slower than this the middle of the sole rests: it is far slower while flat, faster once the heel rises
-(our choice, looked at on simulated walks)."""
+"""Speed below which the middle of the sole rests: it is far slower while flat, faster once the heel rises
+(our choice, based on simulated walks).
+"""
 
 SAME_M = 0.04
-"""A foot that rests again so near to where it rested last has only been restless: one print, not two."""
+"""A rest this close to the previous one is the same footprint."""
 
 _REST_WINDOW_S = 0.1
 
@@ -61,7 +62,7 @@ def lay_trail(t_s: Floats, valid: Bools, path: Floats | Single) -> FootTrail:
     """Divide a path (n, 3) into line segments, with gaps where samples are invalid."""
     stride = np.linalg.norm(np.diff(path, axis=0), axis=1)
     gone = np.concatenate(([0.0], np.cumsum(np.where(valid[1:] & valid[:-1], stride, 0.0))))
-    # the first and last sample of every valid run are kept, so that a piece never reaches over a gap
+    # the first and last sample of every valid run are kept, so that no segment crosses a gap
     edge = valid & ~(np.append(valid[1:], False) & np.append(False, valid[:-1]))
     indices = np.flatnonzero(valid & (edge | (np.diff(gone // PIECE_M, prepend=-1.0) > 0)))
     lost = np.cumsum(~valid)

@@ -18,7 +18,7 @@ HEIGHT_PX: Final = 116
 WIDEST_PX: Final = 92
 CSS: Final[dict[Tint, str]] = {"left": "st-l", "right": "st-r", "body": "st-b", "ring": "st-g"}
 FAINT: Final = "st-f"
-"""Of what no sensor measured."""
+"""Of parts without a sensor."""
 
 
 def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
@@ -53,7 +53,7 @@ def draw_still(poses: Poses, t_s: float, near: Side, title: str) -> str | None:
 def _project(points: Floats, front: Floats, near: Side) -> tuple[Floats, float]:
     """Points (n, 2) m, right and up, and their mean distance from the viewer."""
     along = front / np.linalg.norm(front) * (1.0 if near == "right" else -1.0)
-    normal = np.array([-along[1], along[0]])  # to the left of who looks along `along`
+    normal = np.array([-along[1], along[0]])  # to the left when looking along `along`
     flat = np.column_stack((points[:, :2] @ along, points[:, 2]))
     return flat, float((points[:, :2] @ normal).mean())
 

@@ -27,18 +27,19 @@ from sagittal.server.viewer.replay.replay_figure import ReplayFigure
 from sagittal.server.viewer.scene_server import socket_of, start_scene_server, stop_scene_server
 
 IDLE_S = 30.0
-"""A view without a viewer is stopped after this; a page reload comes back well within it."""
+"""Views without viewers are stopped after this time; reloading a page takes much less."""
 
 PATIENCE_S = 4.0
-"""A pipe waits as long for its view: the page loads the 3D client while the view is being opened. Viser's
-client gives its line up a second later; the page then loads it again (replay.js)."""
+"""Time a relay waits for its view: the page loads the 3D client while the view is opening. Viser's client
+gives up a second later; the page then reloads it (replay.js).
+"""
 
 MOST_NAMES = 8
-"""Names that pages gave one view and that find it: those of the last few loads of a tab."""
+"""Names given to one view by pages: those of the last few loads of a tab."""
 
 SWEEP_S = 1.0
 MAX_VIEWS = 48
-"""Open views at most, about 15 MB each for a 10 min walk if all show different ones."""
+"""Maximum number of open views, about 15 MB each for different 10 min walks."""
 
 Key = tuple[str, ...]
 Drawn = TypeVar("Drawn", ReplayFigure, LiveFigure)

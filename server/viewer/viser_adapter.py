@@ -45,7 +45,7 @@ except ImportError as error:
     raise UnknownViserError(f"it has no {error.name or error}") from error
 
 ALLOWED: Final = frozenset({"ViewerCameraMessage"})
-"""Types of messages a browser may send to viser; everything else, such as a request to share, is dropped."""
+"""Message types a browser may send to viser; everything else, such as a request to share, is dropped."""
 _USED: Final = {
     _messages: sorted(ALLOWED),
     _infra: ["websockets"],
@@ -53,11 +53,12 @@ _USED: Final = {
     viser.SceneApi: ["_queue_scene_message"],
     SceneNodeUpdateMessage: ["redundancy_key", "entity_state_key", "as_serializable_dict"],
 }
-"""What is used, by what has it."""
+"""Required names, by object."""
 
 WINDOW_S: Final = 0.1
-"""How long viser gathers what nobody asked to be sent at once: longer than a picture is shown, so that its
-thread sleeps from one picture to the next. At its own sixtieth of a second it wakes between for nothing."""
+"""How long viser collects messages not sent immediately: longer than a frame, so that its thread sleeps from
+one frame to the next. With its default of a sixtieth of a second it would wake up unnecessarily.
+"""
 
 
 class ArraysChanged(  # type: ignore[call-arg]  # viser's types are not looked at
@@ -131,7 +132,7 @@ def show_at_once(server: viser.ViserServer) -> Iterator[None]:
     finally:
         with buffer.buffer_lock:
             buffer.atomic_counter -= 1
-        # RuntimeError: the server has stopped, and nobody is to be woken
+        # RuntimeError: the server has stopped
         with suppress(RuntimeError):
             buffer.event_loop.call_soon_threadsafe(_wake, buffer)
 
@@ -186,8 +187,7 @@ def _serve(handler: Any, host: str, port: int, **options: Any) -> Any:
     return websockets.asyncio.server.serve(handler, host, port, **options)
 
 
-# viser has no way to say where it listens but host and port: we give its own module, and no other, a `serve`
-# that knows paths
+# viser can only listen on host and port: we replace `serve` in its module with one that supports paths
 _infra.websockets = SimpleNamespace(
     asyncio=SimpleNamespace(server=SimpleNamespace(serve=_serve)),
     datastructures=websockets.datastructures,

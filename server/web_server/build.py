@@ -11,7 +11,7 @@ from sagittal.server.web_server.connection import ConnectionLimits, make_connect
 from sagittal.server.web_server.proxies import TrustedProxies
 
 GRACE_S = 4
-"""Time open requests (event streams, views) have to end after SIGTERM; all in all it ends within 10 s."""
+"""Time limit for open requests (event streams, views) after SIGTERM; in total it ends within 10 s."""
 
 
 def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> uvicorn.Server:
@@ -21,7 +21,7 @@ def build_server(app: ASGIApp, settings: Settings, limits: ConnectionLimits) -> 
             TrustedProxies(app, settings.proxies) if settings.proxies else app,
             log_level="warning",
             access_log=False,
-            # the listener and the connections are made for these two
+            # listener and connections are designed for these two
             loop="asyncio",
             http=make_connection_class(limits),
             proxy_headers=False,

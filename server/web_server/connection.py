@@ -94,7 +94,8 @@ class TimedConnection(H11Protocol):
         self._upgraded = True
         self._stop_unread_timer()
         super().handle_websocket_upgrade(event)
-        # what is no handshake (a POST, a body, too many headers) is neither answered there nor given a time
+        # a request that is no handshake (a POST, a body, too many headers) gets neither a response nor a
+        # timeout there
         if not self.transport.get_protocol().handshake_initiated:  # type: ignore[attr-defined]
             self._refuse(400, "This is no websocket handshake: send a GET without a body and fewer headers.")
 
@@ -138,7 +139,7 @@ class TimedConnection(H11Protocol):
         )
 
     def _end_unread(self, unread: int) -> None:
-        # one answer may be long: on a slow line it leaves in many windows
+        # a long response may take many windows on a slow connection
         if self.transport.get_write_buffer_size() < unread:
             self._watch_unread()
         else:
@@ -157,7 +158,7 @@ class TimedConnection(H11Protocol):
         if self.conn.trailing_data[0]:
             self._refuse(408, f"The head of the request did not come within {self.limits.head_s:g} s.")
         else:
-            self.transport.close()  # browsers open connections in advance, and an answer would puzzle them
+            self.transport.close()  # browsers open connections in advance, and a response would confuse them
 
     def _refuse(self, status: int, detail: str) -> None:
         """Send an error response if still possible, and close."""
@@ -177,7 +178,7 @@ class TimedConnection(H11Protocol):
             self.cycle.disconnected = True
             self.cycle.message_event.set()
         if self.transport.get_write_buffer_size():
-            self.transport.abort()  # who does not read would keep the rest here
+            self.transport.abort()  # a client that does not read would keep the rest here
         else:
             self.transport.close()
 

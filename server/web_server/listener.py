@@ -12,9 +12,9 @@ import time
 from typing import Any, Final
 
 PER_CONNECTION: Final = 3
-"""Descriptors of the dearest connection, that of a 3D view: the browser's and both ends of viser's."""
+"""Descriptors of the most expensive connection, that of a 3D view: the browser's and both ends of viser's."""
 RESERVED: Final = 256
-"""Descriptors for everything that is no connection: the database, files, views, workers."""
+"""Descriptors for everything other than connections: database, files, views, workers."""
 
 _OUT_OF_RESOURCES: Final = frozenset({errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM})
 
@@ -86,9 +86,9 @@ class ListeningSocket(socket.socket):
         try:
             super().accept()[0].close()
         except OSError:
-            # another thread took the descriptor, or the guest has gone
+            # another thread took the descriptor, or the client has disconnected
             if not had_spare:
-                time.sleep(0.01)  # not to spin until one is free
+                time.sleep(0.01)  # avoid spinning until one is free
         self._keep_spare()
 
     def _keep_spare(self) -> None:
@@ -132,7 +132,7 @@ def make_room(connections: int) -> int:
     if soft < descriptors:
         soft = descriptors if hard == resource.RLIM_INFINITY else min(descriptors, hard)
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    # a limit below the reserve is met by the spare descriptor of the listener
+    # a limit below the reserve is covered by the listener's spare descriptor
     room = max((soft - RESERVED) // PER_CONNECTION, soft // (2 * PER_CONNECTION))
     if room < connections:
         log.warning(

@@ -28,9 +28,9 @@ MODULE: Final = "sagittal.server.worker.backing_up"
 log = logging.getLogger(MODULE)
 
 BACKUP: Final = "backup"
-"""The duty of making one, which one web server has at a time."""
+"""Task of making a backup, which one web server runs at a time."""
 LOOK_S: Final = 20.0
-"""Pause between two looks at the clock and at who has been erased."""
+"""Interval of checking the time and recent erasures."""
 
 
 class BackupKeeper:

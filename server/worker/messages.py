@@ -22,7 +22,7 @@ class Input(msgspec.Struct, frozen=True, tag=True):
 
 
 class Order(msgspec.Struct, frozen=True, tag=True):
-    """Worker to child: compute this."""
+    """Worker to child: a computation to carry out."""
 
     kind: str
     space: str | None

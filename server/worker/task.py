@@ -42,7 +42,7 @@ class Task:
 
 
 TASKS: dict[str, Task] = {}
-"""Kind → task; filled by the modules that settings.task_modules names."""
+"""Kind → task; filled by the modules in settings.task_modules."""
 
 
 def register(task: Task) -> Task:

@@ -60,7 +60,7 @@ def _warm() -> None:
     from sagittal.core.fusion import attitude
     from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 
-    # a first walk waits for no filter of few sensors or of live takes: the live estimator compiles those
+    # a first walk does not wait for filters of few sensors or live trials, which the live estimator compiles
     compile_filters_once(OFFLINE)
     attitude.compile_attitude_kernel()
     compile_agreement_kernels()

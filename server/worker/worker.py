@@ -45,17 +45,17 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 IDLE_S = 0.2
-"""Longest wait for a word of the child, and first pause after an error."""
+"""Maximum wait for a message of the child, and first pause after an error."""
 LOOK_S = 0.5
-"""Pause between two looks for a request to cancel, and between two progress writes (at most 2 per second)."""
+"""Interval of checks for a cancel request, and of progress writes (at most 2 per second)."""
 CHECKPOINT_S = 5.0
-"""Least pause between two checkpoints that are stored."""
+"""Minimum interval of stored checkpoints."""
 SWEEP_S = 3600.0
-"""Pause between two sweeps for files that nothing refers to."""
+"""Interval of sweeps for unreferenced files."""
 LONGEST_PAUSE_S = 5.0
-"""Between two tries of a write while somebody else holds the database."""
+"""Maximum pause between retries of a write while the database is busy."""
 WARM_LIMIT_S = 300.0
-"""A child that is not ready by then will not be."""
+"""Time limit for a child to become ready."""
 
 
 class Worker:
@@ -146,7 +146,7 @@ class Worker:
             self._persist(self._queue.note_death, claim)
             return
         except BaseException:
-            # it computes on, and what it says next would be taken for the next job's
+            # it continues computing, and its next message would be taken for that of the next job
             self._drop_child()
             raise
         match end:
@@ -183,7 +183,7 @@ class Worker:
             if isinstance(reply, Result | Failure):
                 return reply
             if isinstance(reply, Stage):
-                if not heard:  # the first word is passed on at once: a short job has no second
+                if not heard:  # the first report is forwarded immediately: a short job has no second
                     heard, next_look = True, began
                 stage = reply
             if isinstance(reply, Checkpoint):
@@ -291,7 +291,7 @@ class Worker:
         if self._persist(self._queue.look, claim) is LeaseState.CANCEL:
             self._persist(self._queue.stop, claim)
         elif blobs and self._queue.get(claim.job_id) is None:
-            # erased while it was computed: nothing of it may wait in the trash
+            # erased in the meantime: nothing of it may remain in the trash
             names = [blob.sha256 for blob in blobs.values()]
             references.discard(self._db, self._blobs, str(claim.params["space"]), names)
 

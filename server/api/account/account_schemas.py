@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints
 
@@ -13,6 +13,7 @@ from sagittal.server.auth import api_tokens
 from sagittal.server.auth.api_tokens import Scope
 from sagittal.server.auth.passwords import MAX_LENGTH, MIN_LENGTH
 from sagittal.server.auth.roles import Role
+from sagittal.web.language import LANGUAGES
 
 SignInName = Annotated[
     str, StringConstraints(min_length=1, max_length=64, pattern=r"^[a-z0-9][a-z0-9._@-]*$")
@@ -116,7 +117,7 @@ class KeysOnly(BothProofs):
 class LanguageChoice(Request):
     """Language of the pages."""
 
-    language: Literal["en", "de"] | None
+    language: Annotated[str, StringConstraints(pattern=f"^({'|'.join(LANGUAGES)})$")] | None
 
 
 @dataclass(frozen=True)

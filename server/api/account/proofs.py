@@ -35,7 +35,7 @@ class Proof:
 
     def check_password(self, password: str) -> None:
         """Raise Problem 403 for a wrong password, 429 after too many."""
-        # 403, not 401: the person is signed in and must not be sent to the sign-in page
+        # 403, not 401: the user is signed in and must not be redirected to the sign-in page
         accounts.check_password(
             self.db, self.failures, self.trail, self.who.name, password, self.address, status=403
         )
@@ -52,7 +52,7 @@ class Proof:
         """Verify the second factor after the password. Raises CodeWrong 403."""
         user_id = self.who.user_id
         if not second_factor.is_on(c, user_id):
-            return  # nor has the account a key
+            return  # the account has no security key either
         remaining = second_factor.count_recovery(c, user_id)
         if not second_factor.use(c, self.settings.second_factor_key, user_id, code):
             raise second_factor.CodeWrong(403)
@@ -73,4 +73,4 @@ async def _proof(
 
 
 Proving = Annotated[Proof, Depends(_proof)]
-"""Of a route of one's own account; it declares the action too."""
+"""Dependency of routes of the user's own account; also declares the action."""

@@ -55,7 +55,7 @@ def add(
 ) -> account_schemas.SecurityKey:
     """Register a security key from its response."""
     site = site_of(request, behind_tls=settings.behind_tls)
-    with db.write() as c:  # of its own: a refusal must not give the challenge back
+    with db.write() as c:  # separate transaction: a rejection must not restore the challenge
         challenge = security_keys.take_challenge(c, user.user_id, "register", body.key)
     try:
         with db.write() as c:

@@ -164,7 +164,7 @@ def set_up(
     """Create the first administrator with the token of the printed link, and sign in."""
     with db.read() as c:
         valid = one_time.is_valid(c, token, "set_up")
-    # the hash takes long: outside of the transaction, and not for everybody who guesses
+    # hashing is slow: do it outside the transaction, and only for valid tokens
     hashed = hash_password(body.password) if valid else ""
     with _told(trail, request), db.write() as c:
         one_time.use(c, token, "set_up")

@@ -28,7 +28,7 @@ STATES: Final[dict[str, Literal["steady", "changed", "unknown"]]] = {
     "warn": "changed",
     "none": "unknown",
 }
-"""Look of a verdict → what programs read."""
+"""Style of an assessment → value for programs."""
 
 COLUMNS = (
     "device_id", "day", "segment", "rate_hz", "rest_start_s", "rest_end_s",

@@ -23,9 +23,9 @@ from sagittal.server.jobs.queue import JobView
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 KEEP_ALIVE_S = 15.0
-"""Proxies cut lines that are silent for longer (nginx: 60 s)."""
+"""Proxies close connections that are silent for longer (nginx: 60 s)."""
 RETRY_MS = 2000
-"""How long a browser waits before it connects again."""
+"""Delay before a browser reconnects."""
 
 Reader = Annotated[Identity, require(Action.READ_JOB)]
 _JOB = TypeAdapter(JobView)

@@ -57,7 +57,7 @@ class _CodeDoor:
     def write(self, user: Identity) -> Iterator[Connection]:
         """Writing transaction; raises Problem 429 after too many conflicts with such codes."""
         account, hidden = f"codes of {user.user_id}", None
-        # counted before it is tried: a burst of guesses cannot pass before the first is counted
+        # counted before the attempt, so that a burst of guesses cannot pass before the first is counted
         begun = self._failures.begin(account, self._address)
         try:
             with self._db.write() as c:

@@ -8,7 +8,7 @@ from urllib.parse import quote
 from starlette.responses import Response
 
 BINARY = {"type": "string", "format": "binary"}
-"""Schema of a body of plain bytes."""
+"""Schema of a binary body."""
 ANY_FILE: dict[int | str, dict[str, Any]] = {
     200: {
         "description": "The file",

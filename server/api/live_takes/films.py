@@ -8,6 +8,7 @@ from fastapi import APIRouter, Depends, Header, Path, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import ClientDisconnect
 
+from sagittal.core.message import Message
 from sagittal.server.api.documents import PUBLIC, refusals
 from sagittal.server.api.live_takes import live_schemas as schemas
 from sagittal.server.api.uploads.files import RAW_BODY, read_size
@@ -64,7 +65,12 @@ async def add_piece(
             piece += some
             if len(piece) > films.MOST_PIECE_BYTES:
                 raise Problem(
-                    413, "file_too_large", f"A piece has at most {films.MOST_PIECE_BYTES} bytes; split it."
+                    413,
+                    "file_too_large",
+                    Message(
+                        "A piece has at most {MOST_PIECE_BYTES} bytes; split it.",
+                        MOST_PIECE_BYTES=films.MOST_PIECE_BYTES,
+                    ),
                 )
     except ClientDisconnect:
         raise Problem(

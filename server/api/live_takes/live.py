@@ -105,7 +105,7 @@ async def pair(
     request: Request, body: schemas.PairingCode, db: Db, hub: LiveHub, trail: OpenTrail, failures: Failures
 ) -> schemas.PairedTablet:
     """Join a tablet to a trial by its single-use code."""
-    # counted per address: a stranger cannot keep other tablets out by guessing
+    # counted per address: a stranger cannot block other tablets by guessing
     address = address_of(request)
     client = f"pairing from {address}"
     await run_in_threadpool(failures.check, client, address)

@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 from typing import Annotated
 
-import msgspec
 from fastapi import APIRouter, WebSocket
 from sqlalchemy.exc import SQLAlchemyError
 from starlette.status import WS_1008_POLICY_VIOLATION, WS_1012_SERVICE_RESTART
@@ -24,13 +23,14 @@ from sagittal.server.auth.roles import Action
 from sagittal.server.clinic import sessions
 from sagittal.server.context import Id, state_of
 from sagittal.server.live.hub import MIND_S, Hub
+from sagittal.server.live.messages import encode_json
 from sagittal.server.live.room import BrowserQueue
 from sagittal.server.nodes.pins import Pin, find_owner
 
 router = APIRouter(include_in_schema=False)
 
 GONE = 4404
-"""Close code: there is no such session (any more)."""
+"""Close code: the session does not exist (any more)."""
 
 
 @router.websocket("/sessions/{sid}/live/feed")
@@ -44,7 +44,7 @@ async def feed(ws: WebSocket, sid: Id, user: Annotated[Identity, require(Action.
         with db.read() as c:
             sessions.get(c, sid)
         state.trail.record_watched(user, "live.watched", "session", sid)
-        return msgspec.json.encode(hub.standing(sid))
+        return encode_json(hub.standing(sid))
 
     try:
         first = await asyncio.to_thread(look)

@@ -10,7 +10,7 @@ from pydantic import Field, StringConstraints
 
 from sagittal.server.api.schemas import HexId, Request, Side
 
-# limits of the numbers are those of sagittal.core.feedback.Prescription; its errors say what was expected
+# numeric limits are checked by sagittal.core.feedback.Prescription, whose errors state the valid range
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Source = Literal["norm", "own_better_side", "own_baseline", "manual"]
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z0-9_]{1,64}$")]

@@ -33,7 +33,7 @@ references = APIRouter(prefix="/sessions/{session_id}/references", tags=["filter
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 Uploader = Annotated[Identity, require(Action.UPLOAD)]
 FilterName = Annotated[str, Field(json_schema_extra={"enum": [f.name for f in FILTERS]})]
-"""Documented as a choice; another name is refused with a sentence by the service."""
+"""Documented as an enumeration; other names are rejected by the service with a message."""
 ReferenceName = Annotated[str, Path(max_length=500, description="any Unicode")]
 
 

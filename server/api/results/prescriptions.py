@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query
 from starlette.responses import Response
 
 from sagittal.core.feedback.prescription import SOURCES
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import list_trainable
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
@@ -79,7 +80,13 @@ def read_targets(
     trainable = list_trainable()
     if parameter not in trainable:
         raise Problem(
-            422, "bad_value", f"'{parameter}' cannot be trained; expected one of {', '.join(trainable)}."
+            422,
+            "bad_value",
+            Message(
+                "'{parameter}' cannot be trained; expected one of {trainable}.",
+                parameter=parameter,
+                trainable=", ".join(trainable),
+            ),
         )
     with db.read() as c:
         walk = targets.last_walk(c, reviewed, patients.get(c, patient_id))

@@ -13,7 +13,7 @@ from sagittal.server.api.schemas import Line, Request
 Seconds = Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False, description="s from the start")]
 
 AnySeconds = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False, description="s from the start")]
-"""Also before the recording: what is typed there is refused in words of the review, not of the form."""
+"""Also before the recording: such times are rejected with a message of the review rather than of the form."""
 
 
 class EditNew(Request):

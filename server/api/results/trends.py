@@ -72,7 +72,7 @@ def _follow(
 
 
 Followed = Annotated[tuple[PatientHistory, tuple[Trend, ...]], Depends(_follow)]
-"""The patient's history and the figures that the address asks for; its reader is allowed and written down."""
+"""The patient's history and the requested parameters; access is checked and audited."""
 
 
 @router.get("/trends", response_model=None, responses=_JSON)

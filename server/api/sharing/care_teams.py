@@ -74,8 +74,8 @@ def open_in_emergency(
     user: Annotated[Identity, require(Action.OPEN_IN_EMERGENCY)],
 ) -> care_teams.EmergencyAccess:
     """Open a patient with a known exact code for four hours; team and administrators can see the access."""
-    # counted, so that nobody looks for people by guessing codes; by a key of its own, so that failed sign-ins
-    # at the clinic's one address do not close this door, nor wrong codes the sign-in
+    # counted, so that codes cannot be guessed; with a separate key, so that failed sign-ins from the clinic's
+    # shared address do not block emergency access, nor wrong codes the sign-in
     account, address = f"emergency of {user.user_id}", f"emergency {address_of(request)}"
     attempt = failures.begin(account, address)
     try:

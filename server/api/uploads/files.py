@@ -12,6 +12,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 
+from sagittal.core.message import Message
 from sagittal.server.api import schemas
 from sagittal.server.api.documents import refusals
 from sagittal.server.api.downloads.downloads import BINARY, attachment
@@ -25,7 +26,7 @@ from sagittal.server.uploads import receiving, recordings
 router = APIRouter(prefix="/sessions/{session_id}/files", tags=["files"])
 
 CHUNK_BYTES = 1_000_000
-"""One thread hop and one write per megabyte, whatever pieces the network delivers."""
+"""One thread hop and one write per megabyte, independent of network packets."""
 
 FileName = Annotated[str, Path(max_length=2000, description="with folders; any Unicode")]
 RAW_BODY = {"content": {"application/octet-stream": {"schema": BINARY}}}
@@ -84,7 +85,7 @@ async def post_files(
         raise Problem(
             411, "length_required", "A form upload must state its length. Send a Content-Length header."
         )
-    # boundaries and part headers take some hundred bytes a file
+    # boundaries and part headers take some hundred bytes per file
     size = read_size(request, settings.max_set_bytes + 1000 * settings.max_files)
     if not request.headers.get("content-type", "").startswith("multipart/form-data"):
         raise Problem(422, "no_form", "Expected multipart/form-data with the field 'files'.")
@@ -165,8 +166,12 @@ def read_size(request: Request, limit: int) -> int:
         raise Problem(
             413,
             "file_too_large",
-            f"The body has {declared} bytes, at most {limit} are taken. "
-            "Split the recording or ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+            Message(
+                "The body has {declared} bytes, at most {limit} are taken. Split the recording or "
+                "ask the administrator (SAGITTAL_MAX_FILE_BYTES).",
+                declared=declared,
+                limit=limit,
+            ),
         )
     return int(declared)
 

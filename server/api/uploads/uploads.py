@@ -108,7 +108,7 @@ async def add_part(
     def keep(offset: int, piece: bytes) -> uploads.FileUpload:
         return uploads.add_part(db, blobs, settings, session_id, upload_id, offset, piece)
 
-    # refused before the first byte is waited for
+    # rejected before the first byte is received
     this = await run_in_threadpool(keep, offset, b"")
     try:
         async for piece in read_megabytes(request):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 Side = Literal["left", "right"]
 
 HEIGHT_M = 1.75
-"""Of the simulated person."""
+"""Body height of the simulated subject."""
 
 
 def sensitivity(

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 ACTIVITY: Final = "activity"
-"""The script of hours of daily life."""
+"""Script name for hours of daily life."""
 
 
 def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: float = 24.0) -> int:

@@ -15,7 +15,7 @@ from sagittal.server.commands.options import Manifest, Take
 from sagittal.server.storage import fs
 
 Span = Annotated[tuple[float, float], Parameter(metavar="FROM TO")]
-"""A part of a recording, s."""
+"""A period of a recording, s."""
 
 
 def stairs(

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 TAKES: Final = "takes"
 KEPT: Final = ("analysis.json", "strides.csv")
-"""Result files of a take that the tables are made of."""
+"""Result files of a trial required for the tables."""
 _STATE: Final = "state.json"
 
 
@@ -111,7 +111,7 @@ def _analyse_all(
         for done in as_completed(running):
             name = running[done]
             error = done.exception()
-            # the others go on, whatever happened in the process of this one
+            # the other trials continue, whatever happened in this process
             states[name] = done.result() if error is None else _died(error)
             code = states[name]["code"]
             sys.stderr.write(f"{len(states)}/{len(takes)} {name}{f': {code}' if code else ''}\n")

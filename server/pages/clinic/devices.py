@@ -12,6 +12,7 @@ from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from sagittal.core.frames import GRAVITY
+from sagittal.core.message import Message
 from sagittal.core.quality.device_course import (
     ACC_NOISE_ROSE,
     BIAS_MOVED,
@@ -42,7 +43,7 @@ LIMITS: Final = {
     "gyro_noise": f"{GYRO_NOISE_ROSE:g}",
     "acc_noise": f"{ACC_NOISE_ROSE:g}",
 }
-"""Limits as the pages say them: °/s, %, %, times, times."""
+"""Limits as shown on pages: °/s, %, %, times, times."""
 
 
 @router.get("/sensors")
@@ -137,7 +138,7 @@ def _charts(d: KnownDevice) -> list[dict[str, str]]:
         add("Gyroscope bias, distance from usual", "°/s", moved, 2, 0.0, (0.0, degrees(course.bias_limit)))
     for i, axis in enumerate("xyz"):
         values = [None if b is None else float(b[i]) for b in biases]
-        add(f"Gyroscope bias, {axis}", "°/s", values, 2, 2.0 * degrees(BIAS_MOVED))
+        add(Message("Gyroscope bias, {axis}", axis=axis), "°/s", values, 2, 2.0 * degrees(BIAS_MOVED))
     scale = [_times(100.0, k.gravity_scale) for k in checks]
     add("Gravity at rest", "% of 9.81 m/s²", scale, 1, 200.0 * SCALE_MOVED, _find_scale_band(course))
     add("Gyroscope noise", "°/s/√Hz", [_times(degrees(1.0), k.gyro_noise) for k in checks], 3, 0.01)

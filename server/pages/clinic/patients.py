@@ -42,7 +42,7 @@ FILTERS: Final = (
     ("today", "Here today"),
     ("check", "To check"),
 )
-"""Which rows of the list are looked at: key and words."""
+"""Filters of the list: key and label."""
 
 
 @router.get("/patients")

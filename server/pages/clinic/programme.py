@@ -10,6 +10,7 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
+from sagittal.core.message import Message, join_messages
 from sagittal.core.plurals import plural
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
@@ -31,7 +32,7 @@ STATE_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "next": ("run", "Next"),
     "planned": ("none", "Planned"),
 }
-"""State of a planned visit → shape and word."""
+"""State of a planned visit → symbol and word."""
 
 
 @router.get("/patients/{pid}/programme")
@@ -62,11 +63,19 @@ def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
     weeks = range(min(v.week for v in programme.visits), max(v.week for v in programme.visits) + 1)
     upcoming = programme.next
     visits = len(programme.visits)
-    parts = [f"{programme.count('done')} of {visits} {plural(visits, 'visit', 'visits')} done"]
+    parts = [
+        Message(
+            f"{{count}} of {{visits}} {plural(visits, 'visit', 'visits')} done",
+            count=programme.count("done"),
+            visits=visits,
+        )
+    ]
     if missing := programme.count("missing"):
-        parts.append(f"{missing} missing")
+        parts.append(Message("{missing} missing", missing=missing))
     if upcoming is not None:
-        parts.append(f"next {upcoming.label} on {day(upcoming.planned_on)}")
+        parts.append(
+            Message("next {label} on {planned_on}", label=upcoming.label, planned_on=day(upcoming.planned_on))
+        )
     return {
         "id": programme.id,
         "starts_on": programme.starts_on,
@@ -82,12 +91,18 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     trainings = [v for v in mine if v.kind == "training"]
     done = sum(v.state == "done" for v in trainings)
     missing = sum(v.state == "missing" for v in trainings)
-    text = f"{done} of {len(trainings)} {plural(len(trainings), 'training', 'trainings')} done"
+    text: str = Message(
+        f"{{done}} of {{trainings}} {plural(len(trainings), 'training', 'trainings')} done",
+        done=done,
+        trainings=len(trainings),
+    )
     if missing:
-        text += f", {missing} missing"
+        text = join_messages(text, Message(", {missing} missing", missing=missing), between="")
     # the course counts weeks without a week 0: the one before the first training is −1
     return {
-        "name": "now" if now else f"wk {format_number(week if week > 0 else week - 1)}",
+        "name": "now"
+        if now
+        else Message("wk {format_number}", format_number=format_number(week if week > 0 else week - 1)),
         "now": now,
         "gap": not mine,
         "assessments": [v for v in mine if v.kind == "assessment"],

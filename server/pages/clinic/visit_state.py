@@ -17,7 +17,7 @@ STATES: Final[Mapping[str, tuple[str, str]]] = {
     "done": ("ok", "Analysed"),
     "failed": ("bad", "Not analysable"),
 }
-"""State of a session → shape and word."""
+"""State of a session → symbol and word."""
 
 
 LIVE_STATES: Final[Mapping[str, tuple[str, str]]] = {
@@ -25,7 +25,7 @@ LIVE_STATES: Final[Mapping[str, tuple[str, str]]] = {
     "open": ("none", "Waiting for the tablet"),
     "streaming": ("run", "Live now"),
 }
-"""State of a running live take → shape and word."""
+"""State of a running live trial → symbol and word."""
 
 
 def describe_live(take: live.LiveTakeRecord) -> dict[str, str]:

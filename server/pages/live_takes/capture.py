@@ -19,11 +19,11 @@ from sagittal.server.pages.words import CALIBRATIONS, SEGMENT_NAMES
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 PLACES = ("chest", "pelvis", "thigh_r", "thigh_l", "shank_r", "shank_l", "foot_r", "foot_l")
-"""As one sees the person from the front, top to bottom."""
+"""As seen from the front, top to bottom."""
 
 
 FILM_BITS_PER_S: Final = 1_500_000
-"""What the page asks the browser's recorder for."""
+"""Bit rate requested from the browser's recorder."""
 
 
 @router.get("/capture", dependencies=[require(Action.PAIR)])
@@ -38,6 +38,6 @@ def show_capture(request: Request, settings: Config) -> Response:
         "calibrations": CALIBRATIONS,
         "places": [(place, SEGMENT_NAMES[place]) for place in PLACES],
     }
-    # the only page that may use a camera
+    # the only page with access to the camera
     headers = {"Permissions-Policy": allow_camera("(self)")}
     return render(request, "capture.html", context, headers=headers)

@@ -28,7 +28,7 @@ from sagittal.server.results import prescriptions
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 JOINTS: Final = {"hip_flexion": "Hip", "knee_flexion": "Knee", "ankle_dorsiflexion": "Ankle"}
-"""Variables of the current stride → the word on the button; the sagittal plane, which live is sure of."""
+"""Variables of the current stride → label of the button; sagittal plane only, which is reliable live."""
 
 UNPRESCRIBED: Final = (
     "step_length_m",
@@ -38,7 +38,7 @@ UNPRESCRIBED: Final = (
     "knee_flexion_max_swing_deg",
     "foot_pitch_ic_deg",
 )
-"""What the strip of strides offers to watch when nothing is prescribed."""
+"""Options of the stride strip without a prescription."""
 
 LOOPBACK: Final = ("127.0.0.1", "::1", "localhost")
 

@@ -15,7 +15,7 @@ PAGE_HEIGHTS: Final = {False: 144, True: 158}
 PAPER_HEIGHTS: Final = {False: 124, True: 138}
 
 GLANCE_HEIGHT: Final = 92
-"""Of the three curves on the first sheet of paper."""
+"""Of the three curves on the first printed page."""
 
 KEY_HEIGHT: Final = 186
 """Chart heights in px; the last row also carries the unit of the x axis."""

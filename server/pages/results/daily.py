@@ -17,7 +17,7 @@ from sagittal.server.report.view.daily_life import EVENTS_SHOWN, DailyLifeView
 from sagittal.server.report.words.daily_words import KIND_LABELS, KIND_WORDS, format_hours
 
 DAYS_A_SHEET: Final = 7
-"""Days on one sheet of the printed report."""
+"""Days per page of the printed report."""
 
 TEMPLATES: Final = {"session.html": "daily.html", "print.html": "daily-print.html"}
 """Page of a walk → page of daily life."""

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sagittal.core.errors import SagittalError
 from sagittal.core.events.result import Strides
+from sagittal.core.message import Message
 from sagittal.server.clinic.patients import Patient
 from sagittal.server.report.files.bundle import read_poses
 from sagittal.server.report.view.model import ReportModel
@@ -22,7 +23,7 @@ from sagittal.server.viewer.still import draw_still
 log = logging.getLogger(__name__)
 
 MOST_FRAMES: Final = 120_000
-"""A page would wait too long for the first picture of a walk of more, 20 min at 100 Hz."""
+"""Longer walks have no first frame, which would delay the page: 20 min at 100 Hz."""
 
 
 def draw_contact(
@@ -34,7 +35,7 @@ def draw_contact(
     included = [s for s in strides.strides if s.excluded_reason is None]
     mine = [s for s in included if s.side == patient.affected_side] or included
     middle = mine[len(mine) // 2]
-    caption = f"Contact, {middle.side} foot"
+    caption = Message("Contact, {side} foot", side=middle.side)
     poses = read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet"))
     svg = draw_still(poses, middle.start_s, middle.side, caption)
     return None if svg is None else {"svg": svg, "caption": caption}

@@ -11,13 +11,13 @@ from sagittal.server.sharing.signed_reports import ASSESSMENT_CHARACTERS
 MOST_PARAGRAPHS: Final = 3
 MOST_BARS: Final = 6
 MOST_LINES: Final = 13
-"""Of note and headline, where ten rows, three curves and the profile stand below them."""
+"""Maximum lines of note and headline with ten rows, three curves and the profile below."""
 
 MOST_LINES_COMPARED: Final = 6
-"""The same where a column of changes makes the other columns narrow, so that rows need two lines."""
+"""Likewise with a column of changes, which narrows the others so that rows need two lines."""
 
 HALF: Final = 48
-"""English characters of a line of half a sheet; the same in German, which is longer, has room too."""
+"""English characters per line of half a page; leaves room for the longer German text."""
 
 
 def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) -> bool:
@@ -40,7 +40,7 @@ def has_room_for_profile(report: Mapping[str, Any], assessment: str, note: str) 
     if report["trend"] is not None and (report["trend"].missing or report["trend"].later):
         noted += 1
     return (
-        len(assessment) <= ASSESSMENT_CHARACTERS  # of earlier versions are longer ones, over the whole width
+        len(assessment) <= ASSESSMENT_CHARACTERS  # earlier versions were longer, over the full width
         and assessment.strip().count("\n") < 2 * MOST_PARAGRAPHS
         and max(columns) + noted <= (MOST_LINES_COMPARED if report["since"] else MOST_LINES)
     )

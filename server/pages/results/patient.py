@@ -12,6 +12,7 @@ from sqlalchemy import Connection
 from starlette.responses import Response
 
 from sagittal.core.change import parameter_changes
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.auth.access import require
@@ -76,7 +77,7 @@ def show_patient(
     trend = None
     if results:
         trained = next((w.content for w in written if w.ended_at is None), None)
-        with suppress(StoreAway):  # the visits say that they cannot be read; the next one can be begun
+        with suppress(StoreAway):  # the visits report that they are unreadable; a new one can be started
             history = histories.read_history(reviewed, patient, done, plans)
             trend = draw_figures(history, None if trained is None else trained.parameter)
     walked = histories.baseline([a for a in done if a.session.protocol in sessions.WALKS])
@@ -231,7 +232,10 @@ def _view_speed(
     if own is not None and scale is not None and own.mean.mean is not None:
         text_speeds = ", ".join(text for text in view["speeds"] if text)
         view["figure"] = takes_svg(
-            own.takes, own.mean, scale, f"Takes {text_speeds}, mean {view['speed']} m/s"
+            own.takes,
+            own.mean,
+            scale,
+            Message("Trials {text_speeds}, mean {speed} m/s", text_speeds=text_speeds, speed=view["speed"]),
         )
     previous = visits.find_before(grouped, visit, planned)
     if previous is not None:

@@ -26,9 +26,9 @@ from sagittal.server.results.prescriptions import PatientPrescription
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 FIRST: Final = "step_length_m"
-"""Trained unless something else is chosen: the length of steps is what most studies train."""
+"""Default parameter: step length, trained in most studies."""
 
-ON_CARD: Final = ("Target", "Shown as", "Schedule", "Level", "Ends")
+ON_CARD: Final = ("Target", "Display name", "Schedule", "Level", "Ends")
 
 MODES: Final = (
     ("bar", "Bar", "height shows the value, target marked"),
@@ -77,7 +77,7 @@ PRESETS: Final = (
         ("bar", "tone"), ("own_better_side", "norm", "own_baseline"),
     ),
 )  # fmt: skip
-"""Of this one is chosen; everything else has its default and stands behind "More"."""
+"""The choice; everything else has defaults and is found under "More"."""
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL, SQUAT
 from sagittal.core.plurals import plural
@@ -18,7 +19,7 @@ SECONDARY: Final = (
     "Regularity of the trunk",
     "Support in seconds",
 )
-"""Groups for those who look closer: folded on the page, not on paper."""
+"""Groups for detailed inspection: collapsed on the page, omitted in print."""
 
 MATTERING: Final = (
     "gait_speed_mps",
@@ -42,12 +43,12 @@ MATTERING: Final = (
     "step_count",
     "walking_duration_min",
 )
-"""What a therapist reads first, of what the sensors can give."""
+"""The most important parameters for a therapist, depending on the sensors."""
 
 FIRST_ROWS: Final = 10
 
 NOT_ON_PAPER: Final = ("swing_pct", "swing_time_s", "turning_angle_deg")
-"""What the rest of a stride leaves, and what a straight walk has none of."""
+"""Parameters redundant with others or absent in straight walking."""
 
 require_entries((*MATTERING, *NOT_ON_PAPER), "sagittal.server.pages.results.report_rows")
 
@@ -79,8 +80,14 @@ def _count_beyond(rows: Sequence[ParameterRow]) -> str:
         any(c is not None and c.z is not None and abs(c.z) > BEYOND_SD for c in (r.both, r.left, r.right))
         for r in rows
     )
-    values = f"{len(rows)} {plural(len(rows), 'value', 'values')}"
-    return f"{values}, {beyond} beyond {BEYOND_SD:g} SD" if beyond else values
+    values = Message(f"{{rows}} {plural(len(rows), 'value', 'values')}", rows=len(rows))
+    return (
+        Message(
+            "{values}, {beyond} beyond {BEYOND_SD:g} SD", values=values, beyond=beyond, BEYOND_SD=BEYOND_SD
+        )
+        if beyond
+        else values
+    )
 
 
 def select_groups(model: ReportModel, *, paper: bool) -> list[tuple[str, tuple[ParameterRow, ...]]]:

@@ -12,7 +12,8 @@ from fastapi import APIRouter, Request
 from fastapi.responses import HTMLResponse, RedirectResponse
 from starlette.responses import Response
 
-from sagittal.core.errors import FormatError
+from sagittal.core.errors import FormatError, title_of_code
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue.entry import SQUAT
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
@@ -66,13 +67,14 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 SEVERITIES: Final = ("bad", "warn", "info")
 
 NO_STRIDE_CODES: Final = ("foot_missing", "no_strides", "few_steps")
-"""Notices that explain a take without strides."""
+"""Notices that explain a trial without strides."""
 
 OVERVIEW, CURVES, PAPER, VALUES = "session.html", "kinematics.html", "print.html", "_values.html"
 
 STRIP_STRIDES: Final = {OVERVIEW: 64, CURVES: 150}
-"""A longer walk has too many strides to be told apart beside the figure, and for the overview's 80 kB; the
-timeline shows them."""
+"""Longer walks have too many strides for the strip next to the avatar and for the overview's 80 kB; the
+timeline shows them.
+"""
 
 FIRST_CURVES: Final = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 
@@ -92,7 +94,7 @@ SHOWN: Final = (
     "headline",
     "functional",
 )
-"""Members of ReportModel that templates use as they are."""
+"""Attributes of ReportModel used directly by templates."""
 
 
 @router.get("/sessions/{sid}")
@@ -313,7 +315,7 @@ def _follow(reviewed: ReviewedAnalyses, model: ReportModel, context: Mapping[str
         return None
     visits: dict[dt.date, AnalysedVisit] = {}
     for a, kind in alike:
-        with suppress(IntegrityError, FormatError):  # its own page says what is wrong
+        with suppress(IntegrityError, FormatError):  # its own page reports the problem
             visit = histories.read_visit(reviewed, a, kind)
             if visit.numbers.verdict[0] != "bad":
                 visits[visit.performed_on] = visit
@@ -348,7 +350,9 @@ def view_strides(model: ReportModel) -> dict[str, Any]:
         "used": model.used,
         "norm_source": model.norm_source,
         "at_speed": model.at_speed,
-        "stride_words": f"{sum(model.used.values())} of {len(model.strides)} included",
+        "stride_words": Message(
+            "{sum} of {strides} included", sum=sum(model.used.values()), strides=len(model.strides)
+        ),
         "empty_reason": explain_emptiness(model),
     }
 
@@ -357,9 +361,15 @@ def explain_emptiness(model: ReportModel) -> str:
     """Reason why an analysis has no strides or squats to show."""
     causes = [w.message for code in NO_STRIDE_CODES for w in model.warnings if w.code == code]
     cycle = "squat" if any(name == SQUAT for name, _ in model.groups) else "stride"
-    read = f"{seconds(model.duration_s)} of data were read, but no complete {cycle} was seen in them."
+    read = Message(
+        "{duration_s} of data were read but contain no complete {cycle}.",
+        duration_s=seconds(model.duration_s),
+        cycle=cycle,
+    )
     if cycle == "squat":
-        return model.problem or f"{read} A squat flexes the knee by at least 20° and returns."
+        return model.problem or Message(
+            "{read} A squat flexes the knee by at least 20° and returns.", read=read
+        )
     question = "Check that there is a sensor on each foot and that it is assigned correctly."
     return model.problem or " ".join([read, *(causes or [question])])
 
@@ -372,7 +382,7 @@ def _notices(model: ReportModel) -> list[dict[str, Any]]:
             continue
         box = boxes.setdefault((w.kind, w.code), {"kind": w.kind, "title": w.title, "messages": []})
         if box["messages"]:
-            box["title"] = w.code.replace("_", " ").capitalize()
+            box["title"] = title_of_code(w.code)
         box["messages"].append(w.message)
     return list(boxes.values())
 
@@ -383,7 +393,9 @@ def _not_compared(session: Session, model: ReportModel) -> str | None:
         return None
     if session.feedback:
         return "Walked with feedback: shown, not compared with other visits."
-    return f"No earlier visit in this condition to compare with: {model.condition}."
+    return Message(
+        "No earlier visit in this condition to compare with: {condition}.", condition=model.condition
+    )
 
 
 def _identity(patient: Patient, session: Session, condition: str) -> list[tuple[str, str]]:

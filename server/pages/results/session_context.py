@@ -28,17 +28,14 @@ STAGE_NAMES: Final[Mapping[str, str]] = {
     "angles": "Compute joint angles",
     "parameters": "Compute parameters",
 }
-"""Stages of an analysis in order → what each does, in words.
-
-sagittal.core.pipeline itself takes seconds to import.
-"""
+"""Stages of an analysis in order → description. sagittal.core.pipeline itself takes seconds to import."""
 
 STAGES_OF_DAYS: Final[Mapping[str, str]] = {
     "reading": "Read the files",
     "activity": "Process the days",
     "quality": "Check the data",
 }
-"""The same of a recording of daily life."""
+"""Likewise for daily life."""
 
 
 def read_context(c: Connection, session_id: str) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from sagittal.server.pages.words import PROTOCOL_NAMES
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 
 TICKED_AT_MOST: Final = 100
-"""So many visits can be left out one by one; of more the choice above the list decides."""
+"""Up to this number visits can be excluded individually; otherwise only the filters above the list apply."""
 
 
 @router.get("/study")

@@ -30,7 +30,7 @@ def view_takes(
     ids = [t.session.id for t in visit.takes]
     rows = []
     for row in first:
-        name = level.from_standing(row.name) or row.name  # levels are read from standing in every take
+        name = level.from_standing(row.name) or row.name  # angles are relative to standing in each trial
         for side in (None, *SIDES):
             figure = measured.get((name, side))
             if figure is None or figure.mean.mean is None:

@@ -53,7 +53,7 @@ FIGURES: Final = (
     "stride_time_s",
     "double_support_pct",
 )
-"""On the patient's page: what is trained, then the first of these that were measured."""
+"""On the patient's page: the trained parameter, then the first of these that are available."""
 
 require_entries((name for name in FIGURES if name not in SCORE_TERMS), "sagittal.server.pages.results.trends")
 FIGURES_SHOWN: Final = 5

@@ -9,6 +9,7 @@ from fastapi.responses import HTMLResponse
 from starlette.responses import Response
 
 from sagittal.core.change import Change
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.server.auth.access import require
 from sagittal.server.auth.identity import Identity
@@ -35,7 +36,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 LEAFLET, COURSE = "leaflet.html", "course.html"
 CHART_HEIGHT: Final = 108
-"""In px, so that five rows of charts stand on a sheet."""
+"""In px, for five rows of charts per page."""
 
 
 @router.get("/sessions/{sid}/leaflet")
@@ -119,7 +120,11 @@ def gather_leaflet(db: Database, reviewed: ReviewedAnalyses, sid: str) -> dict[s
         "before": None if previous is None else previous.session.performed_on,
         "practise": None if trained is None else CATALOGUE[trained.parameter].everyday,
         "practise_side": None if trained is None else side_words(trained.side),
-        "made_by": f"Sagittal {this.found.code_version} · {day(this.found.created_at)}",
+        "made_by": Message(
+            "Sagittal {code_version} · {created_at}",
+            code_version=this.found.code_version,
+            created_at=day(this.found.created_at),
+        ),
     }
 
 
@@ -155,5 +160,5 @@ def gather_course(db: Database, reviewed: ReviewedAnalyses, pid: str) -> dict[st
         "identity": identity,
         "titles": [titles[v.session_id] for v in history.visits],
         "conditions": [conditions[v.session_id] for v in history.visits],
-        "made_by": f"Sagittal {CODE_VERSION} · {day(now())}",
+        "made_by": Message("Sagittal {CODE_VERSION} · {day}", CODE_VERSION=CODE_VERSION, day=day(now())),
     }

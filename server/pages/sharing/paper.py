@@ -23,7 +23,7 @@ from sagittal.server.settings import Settings
 from sagittal.server.sharing import pdfs
 
 SHEETS: Final = ("base", "pages", "visits", "daily", "paper")
-"""Style sheets of paper, in their order."""
+"""Style sheets for print, in order."""
 
 _STYLE: Final = re.compile(r"<style>(.*?)</style>", re.DOTALL)
 

@@ -38,7 +38,7 @@ from sagittal.server.storage.schema.tables import new_id
 router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse, route_class=StrictJsonRoute)
 
 SHARED = "report_link"
-"""Whose failed attempts are counted when somebody guesses addresses of reports."""
+"""Throttle key for guesses of report links."""
 
 Reader = Annotated[Identity, require(Action.READ_RESULT)]
 
@@ -138,12 +138,12 @@ def show_shared(
 ) -> Response:
     """The report of a link, without the patient's code."""
     address = address_of(request)
-    guessed = f"{SHARED} {address}"  # who guesses elsewhere stops nobody here
+    guessed = f"{SHARED} {address}"  # guesses from other addresses do not block this one
     try:
         with db.read() as c:
             link = report_links.find_by_token(c, token)
     except LinkNotFound:
-        # only failures: whoever has a valid link reads, whatever others at the same address have guessed
+        # failures only: a valid link works regardless of guesses from the same address
         throttle.begin(guessed, address)
         trail.record_refused("report_link.refused", "session", None, address)
         raise

@@ -11,8 +11,9 @@ from fastapi.responses import HTMLResponse
 from sqlalchemy import Connection
 from starlette.responses import Response
 
+from sagittal.core.errors import title_of_code
 from sagittal.core.frames import SEGMENTS
-from sagittal.core.message import read_message
+from sagittal.core.message import Message, read_message
 from sagittal.core.plurals import plural
 from sagittal.core.subject.anthropometry import LIMITS
 from sagittal.core.user_text import UserText
@@ -54,7 +55,7 @@ BASIS_WORDS: Final = {
 }
 
 KINDS: Final = {"error": "bad", "warning": "warn", "info": ""}
-"""Severity of a notice → its look."""
+"""Severity of a notice → style."""
 
 GONIOMETER: Final = (
     ("pelvis_tilt", "Anterior pelvic tilt"),
@@ -65,7 +66,7 @@ GONIOMETER: Final = (
     ("ankle_dorsiflexion_l", "Dorsiflexion, left"),
     ("ankle_dorsiflexion_r", "Dorsiflexion, right"),
 )
-"""Standing angles that the page asks for; the manifest takes all of `core.subject.standing_angles`."""
+"""Standing angles requested on the page; the manifest accepts all of `core.subject.standing_angles`."""
 
 TAPE: Final = (
     ("leg_m", "Leg", "Anterior superior iliac spine (ASIS) to medial malleolus, standing."),
@@ -76,7 +77,7 @@ TAPE: Final = (
     ("pelvis_width_m", "Pelvis, width", "Between the anterior superior iliac spines (ASIS)."),
     ("pelvis_depth_m", "Pelvis, depth", "Mid-ASIS to mid-PSIS; used together with the width."),
 )
-"""Lengths of `subject.measures` that the page asks for, and how they are taken."""
+"""Lengths of `subject.measures` requested on the page, with instructions."""
 
 LENGTHS: Final = tuple((name, label, *LIMITS[name], how) for name, label, how in TAPE)
 
@@ -281,8 +282,9 @@ def _segment(
 
 def _sensor(device: Mapping[str, Any], segment: str | None) -> dict[str, Any]:
     severities = {n["severity"] for n in device["notices"]}
+    state: tuple[str, str]
     if device["duplicate_of"]:
-        state = ("none", f"copy of {quote_id(device['duplicate_of'])}")
+        state = ("none", Message("copy of {quote_id}", quote_id=quote_id(device["duplicate_of"])))
     elif not device["has_gyro"]:
         state = ("bad", "no gyroscope")
     elif "error" in severities:
@@ -322,10 +324,18 @@ def _facts(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) 
     worst = max((d["lost_pct"] for d in own), default=0.0)
     gap = max((d["longest_gap_s"] for d in own), default=0.0)
     return [
-        ("Sensors", str(len(own)), f"and {copies} {plural(copies, 'copy', 'copies')}" if copies else ""),
+        (
+            "Sensors",
+            str(len(own)),
+            Message(f"and {{copies}} {plural(copies, 'copy', 'copies')}", copies=copies) if copies else "",
+        ),
         ("Rate", ", ".join(f"{r:g}" for r in rates) + " Hz", ""),
         ("Duration", seconds(inspection["duration_s"]), ""),
-        ("Lost samples", f"{number(worst, 1)} %", f"longest gap {gap * 1000:.0f} ms" if gap else ""),
+        (
+            "Lost samples",
+            f"{number(worst, 1)} %",
+            Message("longest gap {gap:.0f} ms", gap=gap * 1000) if gap else "",
+        ),
         ("Signals", ", ".join(["acceleration", *signals]), ""),
         ("Units", "m/s², rad/s" if "gyroscope" in signals else "m/s²", _at_rest(still)),
         ("Time from", ", ".join(CLOCK_WORDS.get(c, c) for c in clocks), ""),
@@ -333,7 +343,11 @@ def _facts(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) 
 
 
 def _at_rest(still: Sequence[float]) -> str:
-    return f"(at rest {min(still):.2f} to {max(still):.2f} m/s²)" if still else ""
+    return (
+        Message("(at rest {still:.2f} to {still2:.2f} m/s²)", still=min(still), still2=max(still))
+        if still
+        else ""
+    )
 
 
 def _notices(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
@@ -345,16 +359,19 @@ def _notices(inspection: Mapping[str, Any], devices: Sequence[Mapping[str, Any]]
         title = (
             "One sensor is a copy of another"
             if len(copies) == 1
-            else f"{len(copies)} sensors are copies of others"
+            else Message("{copies} sensors are copies of others", copies=len(copies))
         )
-        message = f"Identical samples under another id: {pairs}. Copies are not analysed unless selected."
+        message = Message(
+            "Identical samples under another id: {pairs}. Copies are not analysed unless selected.",
+            pairs=pairs,
+        )
         notices.append({"kind": "", "title": title, "message": message})
     everything = [*inspection["notices"], *(n for d in devices for n in d["notices"])]
     for n in everything:
         if n["code"] == DUPLICATE or n["code"] in ABOUT_FILES:
             continue
         suffix = f", {quote_id(n['sensor'])}" if n["sensor"] else ""
-        title = n["code"].replace("_", " ").capitalize() + suffix
+        title = title_of_code(n["code"]) + suffix
         notice = {"kind": KINDS[n["severity"]], "title": title, "message": read_message(n)}
         if notice not in notices:
             notices.append(notice)

@@ -12,6 +12,7 @@ import numpy as np
 
 from sagittal.core.events.result import Stride, Strides
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.core.signals.rest import find_runs
 from sagittal.core.user_text import quote
@@ -101,7 +102,7 @@ def cycle_svg(
     noun = plural(last[0], over.counted.removesuffix("s"), over.counted)
     return plot.draw(
         "chart cycle x-unit" if x_unit else "chart cycle",
-        f"{panel.title} over {over.over}: {n} {noun}",
+        Message("{title} over {over}: {value} {noun}", title=panel.title, over=over.over, value=n, noun=noun),
         f' data-variable="{v.name}"',
     )
 
@@ -149,7 +150,12 @@ def _stride_mark(s: Stride, duration_s: float) -> str:
     off = end if s.tc_s is None else round(1000 * s.tc_s / duration_s)
     title_element, cross = "", ""
     if s.excluded_reason is not None:
-        title = f"{s.side} stride, {s.start_s:.2f} to {s.end_s:.2f} s, excluded: "
+        title = Message(
+            "{side} stride, {start_s:.2f} to {end_s:.2f} s, excluded: ",
+            side=s.side,
+            start_s=s.start_s,
+            end_s=s.end_s,
+        )
         title_element = f"<title>{escape(title + quote(explain_exclusion(s.excluded_reason)))}</title>"
         width = end - start
         cross = f'<path class="xx" d="M{start} {top + 60}l{width} 300M{start} {top + 360}l{width}-300"/>'
@@ -192,7 +198,7 @@ class _CyclePlot(PlotArea):
 
     def foot_offs(self, sides: Mapping[Side, SideCurve]) -> None:
         pct_by_side = {s: c.foot_off_pct for s, c in sides.items() if c.foot_off_pct is not None}
-        # labels stand on their lines, the earlier one to the left; close ones make room for each other
+        # labels are placed at their lines, the earlier one to the left; overlapping ones are shifted
         earlier = min(pct_by_side, key=lambda side: pct_by_side[side], default=None)
         close = len(pct_by_side) == 2 and max(pct_by_side.values()) - min(pct_by_side.values()) < _CLOSE_PCT
         for side, x in pct_by_side.items():

@@ -12,6 +12,7 @@ from typing import Final
 
 from sagittal.core.feedback import FeedbackSplit, Prescription
 from sagittal.core.feedback.summary import MatchedStride
+from sagittal.core.message import Message
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import Term, format_number
 
@@ -20,11 +21,11 @@ TOP, BOTTOM = 12, 34
 """Chart and its margins, px, the padding of `<div class="chart fb-plot">`."""
 
 FAR: Final = 6.0
-"""Values further than this many level widths beyond the zones lie on the edge of the chart."""
+"""Values further than this many level widths outside the zones are drawn at the edge of the chart."""
 
 
 NARROW: Final = 50.0
-"""Runs of strides narrower than this, of 1000, get no word: it would touch the next."""
+"""Runs of strides narrower than this, of 1000, have no label, as it would touch the next."""
 
 
 def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str:
@@ -63,8 +64,12 @@ def feedback_svg(split: FeedbackSplit, content: Prescription, term: Term) -> str
     for i, j, m in _runs(strides, lambda m: (_opens(m), m.cue.level)):
         if not _opens(m) and x(j + 0.5) - x(i - 0.5) >= NARROW:
             x_text = f"{format_coordinate(x(i - 0.5) / 10)}%"
-            plot.add_text(x_text, plot.height + 28, f"level {m.cue.level}", "words", "start")
-    title = f"{term.label} of every stride against the target zone of its level; values in the table"
+            plot.add_text(
+                x_text, plot.height + 28, Message("level {level}", level=m.cue.level), "words", "start"
+            )
+    title = Message(
+        "{label} of every stride against the target zone of its level; values in the table", label=term.label
+    )
     return plot.draw("chart fb-plot", title)
 
 

@@ -8,6 +8,7 @@ from typing import Final, Literal
 import numpy as np
 
 from sagittal.core.frames import Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.signals.rest import find_runs
 from sagittal.server.report.charts.curves import X_TICKS
 from sagittal.server.report.charts.svg import (
@@ -46,7 +47,10 @@ def draw_spread(title: str, lines: Mapping[Side | None, Floats], top: float, end
     else:
         plot.add_fixed(make_time_labels(end, plot.height, 15))
     axis = "the gait cycle" if over == "cycle" else "time"
-    return plot.draw("chart cycle", f"{title}: standard deviation between the filters over {axis}")
+    return plot.draw(
+        "chart cycle",
+        Message("{title}: standard deviation between the filters over {axis}", title=title, axis=axis),
+    )
 
 
 def _path(plot: PlotArea, values: Floats) -> str:
@@ -92,5 +96,6 @@ def draw_agreement(
     plot.add_text("100%", plot.height, "mean of filter and reference", "", "end", dy=30)
     plot.add_text("0", 0, "Filter more ↑", "words halo", "start", dx=5, dy=11)
     return plot.draw(
-        "chart cycle x-unit", f"{title}: filter minus reference over their mean; values in the table"
+        "chart cycle x-unit",
+        Message("{title}: filter minus reference over their mean; values in the table", title=title),
     )

@@ -10,6 +10,7 @@ import numpy as np
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.norms import NormBand
 from sagittal.core.norms.kinematics import Zero
 from sagittal.core.norms.lookup import Norms
@@ -30,13 +31,15 @@ NO_BAND: Final[Mapping[Zero, str]] = {
     "stride_mean": "No norm band: measured relative to its own mean over the stride, unlike the norm.",
     "anatomical": "No norm band: the norm is relative to standing.",
 }
-"""Zero of a curve → why none of the known bands may stand behind it."""
+"""Zero of a curve → why no known band is shown."""
 
-FEW_BAND: Final = f"No norm band: at least {COMPARED} strides per side are needed for a comparison."
+FEW_BAND: Final = Message(
+    "No norm band: at least {COMPARED} strides per side are needed for a comparison.", COMPARED=COMPARED
+)
 """The same where no side has enough strides."""
 
 DRAWN_STRIDES: Final = 40
-"""Single strides drawn per side at most, spread over the take; more only make the page heavy."""
+"""Maximum of single strides drawn per side, spread over the trial; more would only enlarge the page."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +126,7 @@ def same_zero(earlier: CurvePanel, later: CurvePanel) -> tuple[CurvePanel, Curve
     if earlier.zero == later.zero or None in (earlier.zero, later.zero):
         return earlier, later
     if "walking" in (earlier.zero, later.zero):
-        # a curve without a level is not drawn over one that has one
+        # a curve without an absolute level is not overlaid on one that has one
         return replace(earlier, sides={}, reason=reason_words("no_standing")), later
     return _from_standing(earlier), _from_standing(later)
 

@@ -17,12 +17,12 @@ from xml.etree.ElementTree import Element, SubElement
 from sagittal.server.report.charts.paper_words import SVG, place_words
 
 SHEET_PX: Final = 703
-"""Width of a sheet between its margins (web/static/css/pdf.css): 210 mm without 2 × 12 mm."""
+"""Width of a page between its margins (web/static/css/pdf.css): 210 mm minus 2 × 12 mm."""
 WIDTHS_PX: Final = {"r-glance": 197, "r-bot": 120, "r-kin": 230, "r-map": 250, "r-trends": 342, "dayrow": 627}
-"""Width of a chart by what it stands in."""
+"""Width of a chart by its container."""
 
 LABEL_PX: Final = 12
-"""Half of the widest label under the right end of an axis: what stands outside of a figure is cut off."""
+"""Half of the widest label at the right end of an axis: content outside a chart is clipped."""
 
 _RULE: Final = re.compile(r"([^{}]+)\{([^{}]*)\}")
 _COMMENT: Final = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -30,7 +30,7 @@ _TOKEN: Final = re.compile(r"(--[\w-]+)\s*:\s*([^;]+);")
 _LIGHT: Final = re.compile(r"light-dark\(\s*([^,()]+(?:\([^()]*\))?)\s*,[^()]*(?:\([^()]*\))?[^()]*\)")
 _STEP: Final = re.compile(r"[A-Za-z]|[-+]?\d*\.?\d+")
 _NOT_HERE: Final = ("vector-effect", "paint-order", "cursor", "font-variant-numeric")
-"""What a renderer of paper does not know; it would say so of each."""
+"""Declarations unknown to the print renderer, which would warn about each."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def prepare_figures(page: Element, styles: ChartStyles) -> None:
         if "chart" in classes[0] | classes[1]:
             _draw_chart(figure, classes, styles)
             if any(value.startswith("url(#") for shape in figure.iter() for value in shape.attrib.values()):
-                # its own: the renderer changes what it draws
+                # a copy: the renderer modifies its drawing
                 SubElement(figure, f"{SVG}defs").extend(copy.deepcopy(patterns))
 
 

@@ -11,17 +11,19 @@ SVG: Final = "{http://www.w3.org/2000/svg}"
 
 CURVES: Final = frozenset({"ml", "mr", "pvl", "pvr"})
 UPRIGHTS: Final = frozenset({"fol", "for"})
-"""Classes of what a word must not lie on: means of both sides and of the visit before, and the foot-offs."""
+"""Classes of elements that a label must not cover: means of both sides and of the previous visit, and
+foot-off marks.
+"""
 
 LETTER_PX: Final = 5.5
-"""Mean width of a letter at 11 px, of the widest font a little more than it is."""
+"""Mean letter width at 11 px, slightly more than that of the widest font."""
 ABOVE_PX, BELOW_PX, ROOM_PX = 8.5, 2.5, 1.5
-"""Of a line of text over and under its base line, and what is left free around it."""
+"""Extent of a line of text above and below its baseline, and free space around it."""
 STEP_PX: Final = 2
 OUTWARDS_PX: Final = {True: (0, -3), False: (0, 3, 6)}
-"""How far the upper word, and the lower one, may go from its usual line towards the edge and over it."""
+"""Maximum shift of the upper and lower label from their usual line towards and across the edge."""
 ABOVE_PLOT: Final = -5
-"""Base line of what stands above the plot, in px: the foot-offs."""
+"""Baseline of text above the plot, in px: foot-off labels."""
 
 _STEP: Final = re.compile(r"([MlL])|(-?\d+\.?\d*)\s+(-?\d+\.?\d*)")
 

@@ -19,12 +19,12 @@ KEY: Final[dict[Side, str]] = {"left": "l", "right": "r"}
 """Letter of a side in CSS classes."""
 
 TICKS: Final = 5
-"""Round values on a value axis at most."""
+"""Maximum number of ticks on a value axis."""
 ROUNDING: Final = 1e-9
-"""Of a step: an end of the axis that is a multiple of it gets its tick."""
+"""Tolerance as a fraction of a step, so that a multiple at the end of an axis gets its tick."""
 
 BAR_MARKS: Final = (("right", "dr", 4.6), ("left", "dl", 5.2), ("both", "ptf", 5.0))
-"""Marks of a bar from back to front: a ring, a disc, a disc in ink; CSS class and radius in px."""
+"""Marks of a bar from back to front: ring, disc, dark disc; CSS class and radius in px."""
 
 
 def format_coordinate(value: float) -> str:

@@ -23,7 +23,7 @@ from sagittal.server.report.words.estimator import list_estimated_variables
 from sagittal.server.report.words.wording import JUDGED, PATH_JUDGED
 
 if TYPE_CHECKING:
-    # these packages bring numba, which the web process does without
+    # these packages import numba, which the web process avoids
     from sagittal.core.pipeline import TakeAnalysis
     from sagittal.core.signals.calibrated import Calibration
 
@@ -92,7 +92,7 @@ def _devices(analysis: TakeAnalysis) -> list[dict[str, object]]:
 
 
 CLOCK_DOUBTS: Final = ("feet_out_of_time", "clocks_disagree")
-"""Notices that accuse a clock which nothing could put right."""
+"""Notices about uncorrectable clocks."""
 
 
 def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
@@ -102,7 +102,7 @@ def _agreement(analysis: TakeAnalysis) -> dict[str, object] | None:
     agreed = analysis.agreed
     if agreed is None:
         return None
-    # a lag that was told names its sensors once; what is below the limits is agreement
+    # a reported lag names its sensors once; values below the limits are consistent
     lags = {s: x for x in agreed.lags if x.told for s in x.sensors}
     drifts = {x.sensor: x for x in agreed.drifts}
     slips = {x.segment: x for x in agreed.slips}
@@ -195,7 +195,7 @@ def _sensor_places(analysis: TakeAnalysis) -> object:
     """Positions of sensors and joints in cm along the segment's axes, with nominal positions, and the knees'
     hinge axes; None if not estimated from motion.
     """
-    # readers of results, which have nothing of this to write, do without numba
+    # readers of results, which do not need this, avoid numba
     from sagittal.core.agreement.joints import LEG_JOINTS
 
     arms = None if analysis.mounted is None else analysis.mounted.arms

@@ -22,6 +22,7 @@ from sagittal.core.events.edits import Edit, EditKind
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
 from sagittal.core.events.strides import NOTICES
 from sagittal.core.frames import SEGMENTS, Segment, Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL
 from sagittal.core.parameters.measure import MeasuredGait
@@ -38,11 +39,11 @@ EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "exclude_stride": ("stride excluded", "strides excluded"),
     "include_stride": ("stride included despite a rule", "strides included despite a rule"),
 }
-"""Kind of edit → words for one and for several."""
+"""Kind of edit → words for singular and plural."""
 
 
 ABOUT_FILES: Final = frozenset({"ignored_file", "file_not_read", "file_given_twice"})
-"""Codes of notices about files of an upload that hold nothing for this take; the upload page lists them."""
+"""Codes of notices about unused files of an upload, which the upload page lists."""
 
 
 @dataclass(frozen=True)
@@ -141,10 +142,10 @@ def keep_told(notices: Iterable[Notice]) -> tuple[Notice, ...]:
 
 
 FAILURE_CAUSES: Final = ("unequal_lengths", "channel_stuck", "gap")
-"""Why a sensor failed (`sensor_failed`), the most precise first."""
+"""Causes of a failed sensor (`sensor_failed`), the most specific first."""
 
 FAILURE_EFFECTS: Final = ("foot_missing", "figure_incomplete")
-"""What is missing for want of that very sensor."""
+"""Results missing because of that sensor."""
 
 
 def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
@@ -171,12 +172,15 @@ def apply_review(bundle: Bundle, measured: MeasuredGait, edits: Sequence[Edit]) 
     done = Counter(EDIT_WORDS[e.kind] for e in edits)
     notice = Notice(
         "edited",
-        f"Manual changes: {', '.join((f'{n} {words[n > 1]}' for words, n in done.items()))}. The stored "
-        "analysis is unchanged; its files are from before the changes.",
+        Message(
+            "Manual changes: {join}. The stored analysis is unchanged; its files are from before the "
+            "changes.",
+            join=", ".join(f"{n} {words[n > 1]}" for words, n in done.items()),
+        ),
         severity="info",
     )
     warnings = [n for n in bundle.warnings if n.code not in NOTICES]
-    # a functional test is measured by the analysis; edits of strides leave it
+    # a functional test is measured by the analysis and unaffected by edits of strides
     of_test = tuple(p for p in bundle.parameters if is_functional(p.name))
     return replace(
         bundle,

@@ -20,13 +20,13 @@ from sagittal.core.frames import Bools, Floats
 from sagittal.core.signals.memory import give_memory_back
 
 if TYPE_CHECKING:
-    from sagittal.core.events.turns import Turn  # brings numba, which the web process does without
+    from sagittal.core.events.turns import Turn  # imports numba, which the web process avoids
 
 SCHEMA = 1
-"""Version of analysis.json and of the columns beside it; readers refuse a newer one."""
+"""Version of analysis.json and its columns; readers reject newer ones."""
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
-"""First characters of a text that make a spreadsheet calculate it."""
+"""Initial characters that make a spreadsheet interpret a text as a formula."""
 
 
 PLAIN: Final = frozenset({str, int, bool, type(None)})
@@ -80,10 +80,10 @@ def repeat_words(words: Sequence[str], times: int) -> pa.Array[Any]:
 
 
 ParquetColumn: TypeAlias = "np.ndarray | pa.Array[Any] | Callable[[slice], np.ndarray]"
-"""Of every row, or what gives those of some rows when they are written."""
+"""Values of all rows, or a function that returns those of some rows when they are written."""
 
 GROUP: Final = 1 << 17
-"""Rows that are laid out and written together."""
+"""Rows per row group."""
 
 
 def parquet_file(
@@ -103,7 +103,7 @@ def parquet_file(
     for first in range(0, max(1, len(t_s)), GROUP):
         table = _lay_out(t_s, columns, slice(first, first + GROUP)).replace_schema_metadata(metadata)
         if writer is None:
-            # neighbouring samples share their high bytes: splitting the bytes halves the file
+            # adjacent samples share their high bytes: byte splitting halves the file
             split = [f.name for f in table.schema if pa.types.is_floating(f.type)]
             writer = pq.ParquetWriter(
                 sink, table.schema, compression="zstd", use_dictionary=False, use_byte_stream_split=split
@@ -140,7 +140,7 @@ def _as_arrow(part: np.ndarray) -> pa.Array[Any]:
 
 def read_table(data: bytes) -> tuple[pa.Table, dict[str, Any]]:
     """Read a Parquet file of ours with the metadata written by `parquet_file`."""
-    # a file of ours is small: threads cost more than they read, and `pq.read_table` brings in all of
+    # our files are small: threads cost more than they save, and `pq.read_table` imports all of
     # pyarrow.dataset
     table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
     meta: dict[str, Any] = json.loads((table.schema.metadata or {})[b"sagittal"])
@@ -175,17 +175,19 @@ def write_csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
 
 
 LINES: Final = 1024
-"""Rows of a table that are written together."""
+"""Rows of a table written at a time."""
 
 WORDS: Final = frozenset({str, type(None)})
 
 NUMBERS: Final = frozenset({float, type(None), np.float64})
 
 UNSURE: Final = 1e-3
-"""A number so close to half a millionth, in millionths, is rounded as text: its product is off by 1e-4."""
+"""Numbers this close to half a millionth, in millionths, are rounded as text: their product is off
+by 1e-4.
+"""
 
 LARGE: Final = 1e6
-"""From here on all are."""
+"""From here on all numbers are."""
 
 
 def _cells(column: Sequence[object]) -> list[object]:

@@ -49,7 +49,7 @@ from sagittal.server.report.files.columns import (
 )
 
 if TYPE_CHECKING:
-    # these packages bring numba, which the web process does without
+    # these packages import numba, which the web process avoids
     from sagittal.core.pipeline import TakeAnalysis
     from sagittal.core.squat.measures import SquatSide
 
@@ -60,10 +60,10 @@ IN_ORDER: Final = (
     "analysis.json", "poses.parquet", "events.csv", "strides.csv", "steps.csv", "repetitions.csv",
     "angles.parquet", tracks.NAME, signals.NAME,
 )  # fmt: skip
-"""Files as they are given, which is not the order in which they are written."""
+"""Files in the order returned, which differs from the order of writing."""
 
 STRIDE_COLUMNS = ("side", "start_s", "tc_s", "end_s", "opposite_tc_s", "opposite_ic_s", "turn_deg")
-"""What a stride is; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
+"""Columns of a stride; its parameters, `flags` and `excluded_reason` follow in strides.csv."""
 
 
 def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: None) -> dict[str, bytes]:
@@ -77,18 +77,18 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
         written = {} if analysis.activity is None else write_activity(analysis.activity)
         return {"analysis.json": write_json(summarise_analysis(analysis)), **written}
     files = {"analysis.json": write_json(summarise_analysis(analysis))}
-    # what is written is let go of, where the caller keeps no name for the analysis
+    # objects are released after writing, unless the caller holds the analysis
     recording, poses, angles = analysis.recording, analysis.poses, analysis.angles
     measured, squats, held = analysis.measured, analysis.squats, analysis.tracks
     del analysis
     let_go()
-    # first what is larger in memory than as a file
+    # objects larger in memory than as a file first
     if angles is not None:
         held = None if held is None else replace(held, angles=None)
         files["angles.parquet"] = angles_parquet(angles)
         del angles
         let_go()
-    # also where a later stage stopped: who asks why looks at the signals
+    # also if a later stage stopped, since the signals show why
     files[signals.NAME] = signals.signals_parquet(recording)
     del recording
     let_go()
@@ -104,7 +104,7 @@ def analysis_files(analysis: TakeAnalysis, let_go: Callable[[], None] = lambda: 
         files[tracks.NAME] = tracks.tracks_parquet(held)
         del held
         let_go()
-    # behind those, since the figure of a long take lies in a file
+    # after those, since the avatar of a long trial is in a file
     if poses is not None:
         files["poses.parquet"] = poses_parquet(poses)
         del poses

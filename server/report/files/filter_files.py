@@ -37,10 +37,10 @@ from sagittal.server.report.files.columns import (
 )
 
 BINS: Final = 400
-"""Points of a curve over time at most."""
+"""Maximum number of points of a curve over time."""
 
 MOST_ROWS: Final = 1_000_000
-"""Of orientations.parquet, some 15 MB: beyond it every second, third … sample is left."""
+"""Of orientations.parquet, some 15 MB: larger ones are decimated to every second, third … sample."""
 
 SCORES: Final = ("total", "heading", "inclination")
 

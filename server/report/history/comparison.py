@@ -19,7 +19,7 @@ from sagittal.server.report.words.change_words import SCORE_TERMS, ChangeWords, 
 from sagittal.server.report.words.wording import format_number, reason_words
 
 STANDING: Final = "relative to standing"
-"""Of what a change is whose row stands for another zero."""
+"""Description of a change whose row has another zero."""
 
 Group = tuple[str, tuple[ParameterRow, ...]]
 

@@ -16,20 +16,21 @@ import numpy as np
 
 from sagittal.core.activity.parameters import WORN_H
 from sagittal.core.activity.result import ActivityResult
+from sagittal.core.message import Message
 from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.words.wording import format_number
 from sagittal.web.message_format import MONTHS
 
 LONG_BOUT_S: Final = 60.0
-"""Walks at home whose cadence is compared last at least so long: short ones turn and stop."""
+"""Minimum duration of walking bouts at home for comparing cadence: short ones include turns and stops."""
 
 PANEL_PX: Final = 96
 ROOM: Final = 0.06
-"""Part of the time axis left free at both ends."""
+"""Fraction of the time axis left free at both ends."""
 
 LABEL_SHARE: Final = 0.13
-"""Labels under the axis keep this share of its width from each other."""
+"""Minimum distance of labels under the axis, as a fraction of its width."""
 
 
 @dataclass(frozen=True)
@@ -179,4 +180,4 @@ class _TimePanel(PlotArea):
             day = self._first + dt.timedelta(days=days)
             label = f"{day.day} {MONTHS[day.month - 1]}"
             self.add_text(f"{format_coordinate(self.x(day) / 10)}%", self.height, label, "", "middle", dy=15)
-        return self.draw("chart trend-plot", f"{title} over time; values in the table")
+        return self.draw("chart trend-plot", Message("{title} over time; values in the table", title=title))

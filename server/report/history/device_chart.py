@@ -6,13 +6,14 @@ import datetime as dt
 from collections.abc import Sequence
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trend_chart import BOTTOM, LABEL_PX, ROOM, TOP, WIDTH_PX
 from sagittal.server.report.words.wording import format_number
 from sagittal.web.message_format import MONTHS
 
 HEIGHT: Final = 168
-"""px with margins."""
+"""px including margins."""
 
 
 def draw_device(
@@ -52,7 +53,7 @@ def draw_device(
     plot.add_dot(x, v, "pl-b", 5.0)
     x_text, text = f"{format_coordinate(x / 10)}%", format_number(v, digits)
     plot.add_text(x_text, plot.px(v), text, "strong halo", "middle", dy=-11)
-    return plot.draw("chart trend-plot", f"{title} over the trials; values in the table")
+    return plot.draw("chart trend-plot", Message("{title} over the trials; values in the table", title=title))
 
 
 def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:

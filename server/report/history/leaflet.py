@@ -47,7 +47,7 @@ FIGURES: Final = (
         "less far",
     ),
 )
-"""Speed, step and knee: what people who train their walk ask about."""
+"""Speed, step and knee: the parameters most relevant to patients."""
 
 require_entries((f.name for f in FIGURES), "sagittal.server.report.history.leaflet")
 

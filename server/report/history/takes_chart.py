@@ -9,7 +9,7 @@ from sagittal.core.parameters.result import Parameter
 from sagittal.server.report.charts.svg import format_coordinate
 
 WIDTH, HEIGHT, ROOM = 92, 24, 6
-"""Size in px, and what is left free at both ends."""
+"""Size in px, and margin at both ends."""
 
 
 def find_scale(values: Sequence[Parameter]) -> tuple[float, float] | None:

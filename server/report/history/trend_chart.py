@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.charts.svg import KEY, PlotArea, find_round_ticks, format_coordinate
 from sagittal.server.report.history.trends import AnalysedVisit, Trend, TrendSeries
 from sagittal.server.report.words.wording import format_number
@@ -21,15 +22,15 @@ TOP, BOTTOM, LEFT, RIGHT = 22, 22, 44, 12
 """Margins in px, the padding of `<div class="chart trend-plot">`."""
 
 ROOM: Final = 0.06
-"""Part of the time axis left free at both ends."""
+"""Fraction of the time axis left free at both ends."""
 
 LABEL_PX: Final = 46
-"""Width that a label under the axis takes."""
+"""Width of a label under the axis."""
 
 WIDTH_PX: Final = 420
-"""Narrowest width a chart is read at; labels that would touch there are left out."""
+"""Minimum width of a chart for reading; labels that would touch at this width are omitted."""
 SMALL_PX: Final = 170
-"""The same of five charts beside each other."""
+"""Likewise for five adjacent charts."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def trend_svg(
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return plot.draw(
         "chart trend-plot small" if small else "chart trend-plot",
-        f"{title} over the visits; values in the table",
+        Message("{title} over the visits; values in the table", title=title),
     )
 
 
@@ -138,7 +139,7 @@ class _TrendPlot(PlotArea):
     def points(self, line: TrendSeries, digits: int) -> None:
         key = "b" if line.side is None else KEY[line.side]
         assessed = [p for p in line.points if self._visits[p.visit].kind == "assessment"]
-        # what is estimated is on no line with what is measured
+        # estimated values are not connected with measured ones
         for a, b in pairwise([p for p in assessed if not p.estimated] or assessed):
             ends = (self._at(a.visit), a.value), (self._at(b.visit), b.value)
             d = "L".join(f"{format_coordinate(x)} {format_coordinate(self.y(value))}" for x, value in ends)

@@ -22,19 +22,19 @@ from sagittal.server.report.words.change_words import SCORE_TERMS, ChangeWords, 
 from sagittal.server.report.words.wording import Term, format_number, reason_words
 
 FIGURES: Final = ("gait_speed_mps", "gps_sagittal_deg", "step_length_m")
-"""In this order as long as their lines fit into `MOST_LINES`; step length where there is no score."""
+"""In this order as long as their lines fit into `MOST_LINES`; step length if there is no score."""
 
 require_entries((name for name in FIGURES if name not in SCORE_TERMS), "server.report.history.trend_strip")
 
 MOST_LINES: Final = 3
 LEAST_VISITS: Final = 3
-"""Of two the table of values tells the change already."""
+"""For two visits the table of values already shows the change."""
 
 MOST_COLUMNS: Final = 5
-"""The first visit and the last ones; the drawn line has all."""
+"""The first visit and the last ones; the line includes all."""
 
 WIDTH, HEIGHT, ROOM = 74, 15, 4
-"""Of the drawn line in px, and what is left free at both of its ends."""
+"""Of the line in px, and margin at both ends."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def _draw_line(line: TrendSeries, visits: Sequence[AnalysedVisit]) -> str:
     if band:
         tall = format_coordinate(float(y(band[0])) - float(y(band[1])))
         shapes.append(f'<rect class="mdc" x="0" width="{WIDTH}" y="{y(band[1])}" height="{tall}"/>')
-    # what is estimated is on no line with what is measured
+    # estimated values are not connected with measured ones
     joined = [p for p in line.points if not p.estimated] or line.points
     shapes += [
         f'<path class="tr-{key}" d="M{x(a.visit)} {y(a.value)}L{x(b.visit)} {y(b.value)}"/>'

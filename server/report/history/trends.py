@@ -33,12 +33,12 @@ PRIMARY: Final = (
     "stance_pct",
     "gps_sagittal_deg",
 )
-"""Figures shown when the reader has chosen none; without any of them the first that are there."""
+"""Parameters shown by default; if none is available, the first available ones."""
 
 require_entries((name for name in PRIMARY if name not in SCORE_TERMS), "server.report.history.trends")
 
 SCORE_MODE: Final = "offset_removed"
-"""Shape without level: angles start from the standing of that day."""
+"""Shape without offset: angles are relative to the standing posture of that day."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +199,7 @@ def _score_norm(name: str, visits: Sequence[AnalysedVisit]) -> NormValue | None:
     )
     if spread is None:
         return None
-    # GDI* is 100 ± 10 among the reference people by its definition
+    # GDI* is 100 ± 10 in the reference group by definition
     mean, sd = (spread.mean_deg, spread.sd_deg) if name == "gps_sagittal_deg" else (100.0, 10.0)
     return NormValue(name, mean, sd, None, "healthy adults", "Fukuchi et al. 2018, leave-one-out")
 

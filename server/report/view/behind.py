@@ -20,7 +20,7 @@ from sagittal.server.report.words.wording import explain_exclusion, format_numbe
 
 HEIGHT: Final = 220
 TOP, BOTTOM = 12, 24
-"""Chart and its margins, px."""
+"""Chart height and margins, px."""
 
 CSS: Final[dict[Side, tuple[str, float]]] = {"left": ("dl", 5.2), "right": ("dr", 4.6)}
 

@@ -16,7 +16,7 @@ TITLES: Final[Mapping[str, tuple[str, str]]] = {
     "foot": ("Foot, heel to toe", "Winter 2009, from body height"),
     "hip_width": ("Between the hip centres", "person's share of body height"),
 }
-"""Length → its title and what an estimate rests on, `{}` being the measured leg or else the height."""
+"""Length → title and basis of an estimate, `{}` being the measured leg or the height."""
 
 BY_PELVIS: Final = "Harrington 2007, from the measured pelvis"
 

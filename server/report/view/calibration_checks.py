@@ -8,6 +8,7 @@ from typing import Any, Final
 
 from sagittal.core.errors import Notice
 from sagittal.core.frames import SEGMENTS
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server.report.view.quality_box import CALIBRATION_METHODS
 from sagittal.server.report.words.wording import format_number, place_words, speak_places
@@ -17,10 +18,10 @@ VERDICT_WORDS: Final[Mapping[str, tuple[str, str]]] = {
     "redo": ("bad", "redo"),
     "not_judged": ("none", "not assessed"),
 }
-"""Verdict → its shape and its word."""
+"""Verdict → symbol and word."""
 
 WHOLE: Final = "take"
-"""Stands for the checks that no single sensor has."""
+"""Stands for checks of no single sensor."""
 
 
 @dataclass(frozen=True)
@@ -105,16 +106,22 @@ def say_verdict(verdict: str, checks: Sequence[Mapping[str, Any]]) -> str:
         return plural(
             len(checked),
             "Calibration: the one applicable check passed.",
-            f"Calibration: all {len(checked)} checks passed.",
+            Message("Calibration: all {checked} checks passed.", checked=len(checked)),
         )
     if verdict == "not_judged":
         return "The calibration of this trial cannot be checked."
     failed = [c for c in checks if c["verdict"] == "redo"]
     places = list(dict.fromkeys(place_words(c["segment"]) if c["segment"] else "walk" for c in failed))
-    shortened = places if len(places) <= 3 else [*places[:2], f"{len(places) - 2} more"]
+    shortened = places if len(places) <= 3 else [*places[:2], Message("{len} more", len=len(places) - 2)]
     listed = " and ".join(filter(None, (", ".join(shortened[:-1]), shortened[-1])))
-    which = plural(len(failed), "checks failed", "checks failed")
-    return f"Calibrate again: {len(failed)} of {len(checked)} {which}, at the {listed}."
+    which = plural(len(failed), "checks fails", "checks fail")
+    return Message(
+        "Calibrate again: {failed} of {checked} {which}, at the {listed}.",
+        failed=len(failed),
+        checked=len(checked),
+        which=which,
+        listed=listed,
+    )
 
 
 def _view_segment(

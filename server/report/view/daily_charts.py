@@ -15,6 +15,7 @@ import numpy as np
 
 from sagittal.core.activity.result import KINDS, ActivityKind, ActivityResult
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 from sagittal.server.report.charts.svg import PlotArea, find_round_ticks, format_coordinate, make_label
 from sagittal.server.report.view.daily_life import COURSE_S, BoutBin, DayTotals, inclination_course
 from sagittal.server.report.words.daily_words import DASH, DAY_S, KIND_LABELS, TOTALS, format_hours
@@ -24,7 +25,7 @@ RIBBON_PX: Final = 52
 """Height of a day's ribbon."""
 
 SLOT_S: Final = 30
-"""A ribbon shows what fills most of every half minute; at 1000 px a pixel is almost three of them."""
+"""A ribbon shows the predominant activity of each half minute; at 1000 px a pixel covers almost three."""
 
 SLOTS: Final = int(DAY_S) // SLOT_S
 
@@ -39,7 +40,7 @@ LEVELS: Final[dict[ActivityKind, float]] = {
     "non_wear": 0.5,
     "gap": 0.5,
 }
-"""Height of the bar of each kind, share of the ribbon."""
+"""Height of the bar of each activity, fraction of the ribbon."""
 
 CSS: Final[dict[ActivityKind, str]] = {
     "lying": "ak-lie",
@@ -49,7 +50,7 @@ CSS: Final[dict[ActivityKind, str]] = {
     "stairs_up": "ak-walk",
     "stairs_down": "ak-walk",
 }
-"""Class of what is filled with a colour."""
+"""Class of coloured areas."""
 
 PATTERNS: Final[dict[ActivityKind, str]] = {
     "stairs_up": "ap-up",
@@ -58,7 +59,7 @@ PATTERNS: Final[dict[ActivityKind, str]] = {
     "non_wear": "ap-off",
     "gap": "ap-gap",
 }
-"""Pattern over the bar; the page has each once (web/templates/_daily_patterns.html)."""
+"""Pattern over the bar; defined once per page (web/templates/_daily_patterns.html)."""
 
 HOURS: Final = (0, 3, 6, 9, 12, 15, 18, 21, 24)
 LEAN_RANGE: Final = (-90.0, 90.0)
@@ -78,7 +79,9 @@ def ribbon_svg(activity: ActivityResult, day: DayTotals) -> str:
             plot.add_fixed("".join(_patterned(kind, a, b) for a, b in pieces))
     _add_hours(plot, activity)
     summary = ", ".join(f"{c.lower()} {day.times[c]}" for c in TOTALS if day.times[c] != "0:00")
-    return plot.draw("chart ribbon", f"{day.label}, hours and minutes: {summary}")
+    return plot.draw(
+        "chart ribbon", Message("{label}, hours and minutes: {summary}", label=day.label, summary=summary)
+    )
 
 
 def kind_swatch(kind: ActivityKind) -> str:
@@ -115,11 +118,15 @@ def inclination_svg(activity: ActivityResult, day: DayTotals) -> str:
     _add_hours(plot, activity)
     medians = course[np.isfinite(course[:, 1]), 1]
     summary = (
-        f"medians of ten minutes from {medians.min():.0f} to {medians.max():.0f} degrees"
+        Message(
+            "medians of ten minutes from {min:.0f} to {max:.0f} degrees", min=medians.min(), max=medians.max()
+        )
         if len(medians)
         else "not known"
     )
-    return plot.draw("chart ribbon", f"Trunk inclination on {day.label}: {summary}")
+    return plot.draw(
+        "chart ribbon", Message("Trunk inclination on {label}: {summary}", label=day.label, summary=summary)
+    )
 
 
 def bouts_svg(bins: Sequence[BoutBin]) -> str:

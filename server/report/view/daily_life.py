@@ -26,6 +26,7 @@ from sagittal.core.activity.result import (
     TransitionKind,
 )
 from sagittal.core.frames import Floats
+from sagittal.core.message import Message
 from sagittal.core.plurals import plural
 from sagittal.server.report.words.daily_words import (
     DASH,
@@ -43,13 +44,13 @@ from sagittal.server.report.words.daily_words import (
 from sagittal.server.report.words.wording import format_number
 
 BIN_EDGES_S: Final = (10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0)
-"""Ends of the bins of walking bouts, s; the last bin is open."""
+"""Limits of the bins of walking bouts, s; the last bin is open."""
 
 EVENTS_SHOWN: Final = 300
-"""Rows of the list of transitions on the page; the file holds all."""
+"""Rows in the page's list of transitions; the file contains all."""
 
 COURSE_S: Final = 600
-"""The course of inclination is drawn in windows of this length, s."""
+"""Window length for drawing inclination, s."""
 
 
 @dataclass(frozen=True)
@@ -236,10 +237,10 @@ def bin_bouts(bouts: Sequence[ActivityBout]) -> tuple[BoutBin, ...]:
 
 def _bin_label(low: float, high: float) -> str:
     if not low:
-        return f"below {high:.0f}\u202fs"
+        return Message("below {high:.0f}\u202fs", high=high)
     unit, size = ("s", 1.0) if low < 60.0 else ("min", 60.0)
     if np.isinf(high):
-        return f"{low / size:.0f}\u202f{unit} or longer"
+        return Message("{size:.0f}\u202f{unit} or longer", size=low / size, unit=unit)
     if low < 60.0 <= high:
         return f"{low:.0f}–{high:.0f}\u202fs"
     return f"{low / size:.0f}–{high / size:.0f}\u202f{unit}"
@@ -248,7 +249,11 @@ def _bin_label(low: float, high: float) -> str:
 def _describe_day(activity: ActivityResult, i: int, d: ActivityDay) -> DayTotals:
     begins = f"{clock_label(activity, d.start_s)}–" if activity.started_at is not None else ""
     whole = d.end_s - d.start_s > DAY_S - 60.0
-    ends = clock_label(activity, d.end_s) if begins else f"first {format_hours((d.end_s - d.start_s) / 60)} h"
+    ends = (
+        clock_label(activity, d.end_s)
+        if begins
+        else Message("first {format_hours} h", format_hours=format_hours((d.end_s - d.start_s) / 60))
+    )
     is_worn = d.worn_h > 0.0
     return DayTotals(
         label=day_label(i, d.date),
@@ -273,7 +278,7 @@ def _average(days: Sequence[ActivityDay]) -> DayTotals | None:
     n = len(own)
     longest = [d.longest_bout_s for d in own if d.longest_bout_s is not None]
     return DayTotals(
-        label=f"Mean of {n} {plural(n, 'day', 'days')}",
+        label=Message(f"Mean of {{value}} {plural(n, 'day', 'days')}", value=n),
         part="",
         midnight_s=0.0,
         start_s=0.0,

@@ -11,6 +11,7 @@ from sagittal.core.feedback import AnalysedStride, FeedbackSplit, GuardState, Pr
 from sagittal.core.feedback.cue import Summary
 from sagittal.core.feedback.guard import FIRST, LAST
 from sagittal.core.feedback.summary import Kind
+from sagittal.core.message import Message
 from sagittal.core.parameters.rows import Column
 from sagittal.core.plurals import plural
 from sagittal.server.report.charts.feedback_chart import feedback_svg
@@ -42,7 +43,7 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("off", "of these, while off, paused or without current data", True),
     ("stopped", "of these, after the end", True),
 )
-"""Kind of stride, its words, and whether it is a part of the one above."""
+"""Kind of stride, its label, and whether it is part of the row above."""
 
 _HOW_TO_READ: Final = (
     "Values are from the completed analysis; the zone is that of the level at each stride. Only strides "
@@ -165,16 +166,25 @@ def feedback_view(
 
 def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
     """Explanations, and data that could not be used."""
-    notes = [_HOW_TO_READ, f"Side effects: the last {LAST} strides vs the first {FIRST} of the trial."]
+    notes = [
+        _HOW_TO_READ,
+        Message(
+            "Side effects: the last {LAST} strides vs the first {FIRST} of the trial.",
+            LAST=LAST,
+            FIRST=FIRST,
+        ),
+    ]
     live = split.live_difference
     if live.mean is not None and live.sd is not None:
         notes.append(
-            "Live feedback values differed from the analysis by "
-            f"{format_number(live.mean, term.digits + 1)} ± "
-            f"{format_quantity(live.sd, term, term.digits + 1)}."
+            Message(
+                "Live feedback values differed from the analysis by {mean} ± {sd}.",
+                mean=format_number(live.mean, term.digits + 1),
+                sd=format_quantity(live.sd, term, term.digits + 1),
+            )
         )
     for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "an excluded stride")):
         if n:
-            cues = plural(n, "1 cue, excluded, has", f"{n} cues, excluded, have")
-            notes.append(f"{cues} {outcome} in the analysis.")
+            cues = plural(n, "1 cue, excluded, has", Message("{value} cues, excluded, have", value=n))
+            notes.append(Message("{cues} {outcome} in the analysis.", cues=cues, outcome=outcome))
     return tuple(notes)

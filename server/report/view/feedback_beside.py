@@ -20,13 +20,18 @@ from sagittal.core.feedback import (
     SideEffect,
 )
 from sagittal.core.feedback.guard import FIRST, GuardWatch
+from sagittal.core.message import Message
 from sagittal.core.parameters.result import CycleCurves
 from sagittal.server.report.view.feedback_rows import NO_STRIDES, FeedbackRow, describe_summary, format_signed
 from sagittal.server.report.words.feedback_words import digits_of, format_quantity
 from sagittal.server.report.words.wording import Term
 
 EFFECT_REASONS: Final = {
-    "too_few_strides": f"requires {FIRST} strides at the start and {FIRST} afterwards on this side",
+    "too_few_strides": Message(
+        "requires {FIRST} strides at the start and {FIRST2} afterwards on this side",
+        FIRST=FIRST,
+        FIRST2=FIRST,
+    ),
     "joint_missing": "requires joint angles of both legs",
     "both_sides_trained": "both sides are trained",
     "no_limit": "no limit prescribed",
@@ -111,7 +116,14 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
     if effect.change is None:
         explanation = EFFECT_REASONS.get(effect.reason or "", effect.reason or "")
         return SideEffectRow(
-            name, label, "none", None, None, None, NO_STRIDES, f"not assessed: {explanation}"
+            name,
+            label,
+            "none",
+            None,
+            None,
+            None,
+            NO_STRIDES,
+            Message("not assessed: {explanation}", explanation=explanation),
         )
     text = format_signed(effect.change, term)
     if effect.limit is None:
@@ -119,7 +131,9 @@ def _effect(name: str, label: str, effect: SideEffect, term: Term) -> SideEffect
             name, label, "none", effect.change, None, None, text, EFFECT_REASONS[effect.reason or "no_limit"]
         )
     limit = f"{format_quantity(effect.limit, term, max(term.digits, 1))} ({effect.source})"
-    words = f"more than {limit}" if effect.beyond else f"within {limit}"
+    words = (
+        Message("more than {limit}", limit=limit) if effect.beyond else Message("within {limit}", limit=limit)
+    )
     kind = "warn" if effect.beyond else "ok"
     return SideEffectRow(name, label, kind, effect.change, effect.limit, effect.source, text, words)
 
@@ -136,9 +150,15 @@ def compare_retention(
     if limit is None:
         verdict = "the measurement error of this parameter is unknown"
     elif abs(difference) <= limit.value:
-        verdict = f"within the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
+        verdict = Message(
+            "within the measurement error of {value}",
+            value=format_quantity(limit.value, term, term.digits + 1),
+        )
     else:
-        verdict = f"more than the measurement error of {format_quantity(limit.value, term, term.digits + 1)}"
+        verdict = Message(
+            "more than the measurement error of {value}",
+            value=format_quantity(limit.value, term, term.digits + 1),
+        )
     return Retention(
         previous.session_id,
         previous.performed_on,

@@ -30,10 +30,10 @@ HEADLINE: Final = (
     ("foot", "_inclination", "inclination of the foot"),
     ("pelvis", "_inclination", "inclination of the pelvis"),
 )
-"""What the sentence speaks of, the first that there is: name, ending, words."""
+"""Quantity of the sentence, the first available: name, ending, words."""
 
 CLEAR: Final = 1.05
-"""Room above the highest curve."""
+"""Margin above the highest curve."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def view_comparison(
     ran = sum(f["to_median"] is not None for f in data["filters"]) - 1
     rows = tuple(_row(f) for f in data["filters"])
     drawn: Mapping[str, Any] = spreads
-    if ran < 2:  # a single filter is its own median: 0° everywhere, which would read as agreement
+    if ran < 2:  # a single filter is its own median: 0° everywhere would look like agreement
         rows, drawn = tuple(replace(row, to_median=("", "")) for row in rows), {}
     return ComparisonView(
         headline=_headline(spreads, ran, len(data["segments"])),
@@ -157,24 +157,32 @@ def _headline(spreads: Mapping[str, Any], ran: int, sensors: int) -> str:
             values = " and ".join(
                 f"{format_number(s['rms'], 1)}° {side or ''}" for side, s in by_side.items()
             )
-            return f"{filters} on {devices}: their {words} differs by {values.strip()} (standard deviation)."
+            return Message(
+                "{filters} on {devices}: their {words} differs by {strip} (standard deviation).",
+                filters=filters,
+                devices=devices,
+                words=words,
+                strip=values.strip(),
+            )
     if ran == 1:
-        return (
-            f"{filters} on {devices}: there is no other filter to compare with, so it is compared with "
-            "Sagittal's own."
+        return Message(
+            "{filters} on {devices}: there is no other filter to compare with, so it is compared with "
+            "Sagittal's own.",
+            filters=filters,
+            devices=devices,
         )
-    return f"{filters} on {devices}."
+    return Message("{filters} on {devices}.", filters=filters, devices=devices)
 
 
 def _notes(data: Mapping[str, Any], has_cycles: bool) -> list[str]:
     used = "used by filters that support it" if data["magnetometer"] else "not used"
     cycle_counts = " and ".join(f"{data['strides'].get(side, 0)} {side}" for side in SIDES)
     cycles = (
-        f"Over the gait cycle: {cycle_counts} strides."
+        Message("Over the gait cycle: {cycle_counts} strides.", cycle_counts=cycle_counts)
         if has_cycles
         else "No strides included: over time only."
     )
-    return [f"Magnetometer: {used}. {cycles}"]
+    return [Message("Magnetometer: {used}. {cycles}", used=used, cycles=cycles)]
 
 
 def _sides(spreads: Mapping[str, Any], name: str, ending: str) -> dict[Side | None, Any]:
@@ -272,7 +280,12 @@ def _reference(data: Mapping[str, Any], item: str | None, filter_name: str | Non
             if not is_segment:
                 errors.append("" if b is None else _text(b["rmse"]))
             errors += (
-                ["", ""] if b is None else [_text(b["bias"]), f"{_text(b['low'])} to {_text(b['high'])}"]
+                ["", ""]
+                if b is None
+                else [
+                    _text(b["bias"]),
+                    Message("{text} to {text2}", text=_text(b["low"]), text2=_text(b["high"])),
+                ]
             )
         if any(errors):
             rows.append(ReferenceRow(name, label, tuple(errors), name == selected))

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.core.norms.functional import (
     COMFORTABLE_SPEED_SOURCE,
     SIX_MINUTE_SOURCE,
@@ -33,7 +34,7 @@ TOTALS: Final = (
     "walk_6min_distance_m",
     "sway_rms_mps2",
 )
-"""The figure that stands for a test, by what was measured."""
+"""Main parameter of a test, by what was measured."""
 
 require_entries(TOTALS, "sagittal.server.report.view.functional")
 
@@ -49,7 +50,7 @@ SEGMENTS: Final[Mapping[str, str]] = {
     "slowing_down": "Slowing down",
     "standing": "Quiet standing",
 }
-"""Name of a segment → its words; minutes count themselves."""
+"""Name of a phase → label; minutes are numbered automatically."""
 
 MEANT: Final[Mapping[str, str]] = {
     "tug_duration_s": "From the first lean forward to the end of sitting down.",
@@ -58,10 +59,10 @@ MEANT: Final[Mapping[str, str]] = {
     "walk_6min_distance_m": "From the strides of the feet, turns included.",
     "sway_rms_mps2": "From the horizontal acceleration below 3.5 Hz; the forward direction is unknown.",
 }
-"""How the total of a test is meant."""
+"""Explanation of the total of a test."""
 
 TEST_NORM_NOTE: Final = "If a norm exists for the test, it is shown below its phases."
-"""Below the table of a test's parameters."""
+"""Shown below the table of a test's parameters."""
 
 NO_NORM: Final = "No norm: no published values for this test."
 NO_AGE: Final = "No norm: enter the year of birth."
@@ -187,25 +188,49 @@ def norm_words(name: str, age: float | None, sex: str | None = None) -> str:
     if norm is None:
         return NO_AGE if age is None else OTHER_AGE
     limit = format_number(norm.limit_s, 1)
-    people = f"{norm.ages[0]} to {norm.ages[1]} years"
-    mean = "" if norm.mean_s is None else f"mean {format_number(norm.mean_s, 1)} s, "
-    return f"Healthy people of {people}: {mean}slower than average above {limit} s ({norm.source})."
+    people = Message("{ages} to {ages2} years", ages=norm.ages[0], ages2=norm.ages[1])
+    mean = "" if norm.mean_s is None else Message("mean {mean_s} s, ", mean_s=format_number(norm.mean_s, 1))
+    return Message(
+        "Healthy people of {people}: {mean}slower than average above {limit} s ({source}).",
+        people=people,
+        mean=mean,
+        limit=limit,
+        source=norm.source,
+    )
 
 
 def _distance_words(age: float, sex: str) -> str:
     norm = find_six_minute_norm(age, sex)
     if norm is None:
         return OTHER_AGE
-    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    people = Message(
+        f"{'Men' if sex == 'male' else 'Women'} of {{ages}} to {{ages2}} years",
+        ages=norm.ages[0],
+        ages2=norm.ages[1],
+    )
     mean, spread = format_number(norm.mean_m, 0), format_number(norm.sd_m, 0)
-    far = f"{mean} m on average, standard deviation {spread} m"
-    return f"Healthy {people.lower()} walk {far} ({SIX_MINUTE_SOURCE})."
+    far = Message("{mean} m on average, standard deviation {spread} m", mean=mean, spread=spread)
+    return Message(
+        "Healthy {lower} walk {far} ({SIX_MINUTE_SOURCE}).",
+        lower=people.lower(),
+        far=far,
+        SIX_MINUTE_SOURCE=SIX_MINUTE_SOURCE,
+    )
 
 
 def _speed_words(age: float, sex: str) -> str:
     norm = find_comfortable_speed(age, sex)
     if norm is None:
         return OTHER_AGE
-    people = f"{'Men' if sex == 'male' else 'Women'} of {norm.ages[0]} to {norm.ages[1]} years"
+    people = Message(
+        f"{'Men' if sex == 'male' else 'Women'} of {{ages}} to {{ages2}} years",
+        ages=norm.ages[0],
+        ages2=norm.ages[1],
+    )
     mean = format_number(norm.mean_mps, 2)
-    return f"{people} walk at {mean} m/s on average, at their own pace ({COMFORTABLE_SPEED_SOURCE})."
+    return Message(
+        "{people} walk at {mean} m/s on average, at their own pace ({COMFORTABLE_SPEED_SOURCE}).",
+        people=people,
+        mean=mean,
+        COMFORTABLE_SPEED_SOURCE=COMFORTABLE_SPEED_SOURCE,
+    )

@@ -15,6 +15,7 @@ from typing import Final, Literal
 from sagittal.core.change import Change, ChangedFact, SortedChanges, name_fact
 from sagittal.core.events.result import COMPARED, Strides
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import find_entry
 from sagittal.core.parameters.flats import OTHER
 from sagittal.core.plurals import plural
@@ -35,13 +36,13 @@ from sagittal.server.report.words.wording import format_number, parameter_term
 Kind = Literal["norm", "limit", "sides", "change"]
 
 LARGEST: Final = 5.0
-"""Sizes are cut here: what is further off is not told first for being absurd."""
+"""Sizes are capped here, so that absurd values do not come first."""
 
 MOST: Final = 6
-"""Sentences on the page, changes among them."""
+"""Maximum number of sentences on the page, including changes."""
 
 KEPT: Final = 2
-"""Of them for changes, however much stands out; they also take what it leaves free."""
+"""Of these reserved for changes, which may also use free space."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +119,8 @@ class Headline:
     def compared_with(self) -> str:
         """Reference groups of the displayed sentences; empty without any."""
         *groups, last = dict.fromkeys(s.against for s in self.shown) or ("",)
-        groups_text = f"{', '.join(groups)} and {last}" if groups else last
-        return f"against {groups_text}" if groups_text else ""
+        groups_text = Message("{groups} and {last}", groups=", ".join(groups), last=last) if groups else last
+        return Message("vs {groups_text}", groups_text=groups_text) if groups_text else ""
 
     @property
     def ranks(self) -> dict[str, int]:
@@ -178,9 +179,18 @@ def say_badge(kind: str, strides: Strides) -> str:
         return ""
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
-    count_text = f"{count} {plural(count, 'stride', 'strides')} included, {left} left and {right} right"
+    count_text = Message(
+        f"{{count}} {plural(count, 'stride', 'strides')} used, {{left}} left and {{right}} right",
+        count=count,
+        left=left,
+        right=right,
+    )
     if min(left, right) < COMPARED and strides.strides:
-        return f"{count_text}: at least {COMPARED} per side are needed for a comparison."
+        return Message(
+            "{count_text}: at least {COMPARED} strides per side are needed for a comparison.",
+            count_text=count_text,
+            COMPARED=COMPARED,
+        )
     if not strides.strides:
         return "Steps are from the trunk sensor; sides are not compared."
     return f"{count_text}."

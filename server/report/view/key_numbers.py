@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import require_entries
 from sagittal.server.report.view.table import ParameterRow
 
@@ -30,7 +31,7 @@ KEY_NUMBERS: Final = (
 require_entries(KEY_NUMBERS, "sagittal.server.report.view.key_numbers")
 
 SHOWN_LARGE: Final = 4
-"""So many of them are shown, those that were measured."""
+"""Number displayed, of those measured."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def choose_key_numbers(rows: Sequence[ParameterRow]) -> tuple[KeyNumber, ...]:
 
 def _key_number(row: ParameterRow) -> KeyNumber:
     pair = row.both is None
-    norm = f"norm {row.norm}" if row.norm else ""
+    norm = Message("norm {norm}", norm=row.norm) if row.norm else ""
     cells = {"": row.both} if row.both is not None else {" left": row.left, " right": row.right}
     few = ", ".join(f"{c.few}{side}" for side, c in cells.items() if c is not None and c.few)
     return KeyNumber(

@@ -20,10 +20,10 @@ from sagittal.server.report.words.wording import title_of
 GROUP = "Angles from neutral (0°)"
 
 STANDING: Final = "relative to standing"
-"""Words of definitions that do not hold for an anatomical angle."""
+"""Parts of definitions that do not apply to anatomical angles."""
 
 ANATOMICAL: Final = "from neutral (0°)"
-"""Words in their place."""
+"""Their replacements."""
 
 _SUFFIX: Final = "_anatomical_deg"
 

@@ -12,7 +12,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from sagittal.core.errors import Notice
+from sagittal.core.errors import Notice, title_of_code
 from sagittal.core.events.result import Stride
 from sagittal.core.flags import Flag, judge_flags
 from sagittal.core.frames import SIDES, Side
@@ -385,7 +385,7 @@ def _norm_note(bundle: Bundle) -> str | None:
 
 
 def _warning(n: Notice) -> ReportWarning:
-    title = n.code.replace("_", " ").capitalize()
+    title = title_of_code(n.code)
     location = "" if n.sensor is None else f", {place_words(n.sensor)}"
     return ReportWarning(
         kind=_KINDS[n.severity],

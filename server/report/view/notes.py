@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.norms.at_speed import ASKED, SOURCE
 from sagittal.core.norms.controls import ControlGroup
 from sagittal.core.norms.lookup import Norms
@@ -40,8 +41,13 @@ def norm_note(
     if band is not None and angles:
         group = GROUPS.get(band.group, band.group)
         sentences.append(
-            f"{'Comfortable' if matched else 'Norm'}: {band.n} {group}, overground at their comfortable "
-            f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source})."
+            Message(
+                f"{'Comfortable' if matched else 'Norm'}: {{band}} {{group}}, overground at their "
+                "comfortable 1.25 ± 0.16 m/s, mean ± 1 SD ({source}).",
+                band=band.n,
+                group=group,
+                source=band.source,
+            )
         )
     if norms.timing_reason is not None and norms.timing_reason != norms.reason:
         sentences.append(NO_NORM.get(norms.timing_reason, norms.timing_reason))
@@ -54,12 +60,24 @@ def norm_note(
         and not is_angle(r.name)
         and r.unit != "°"
     ]:
-        sentences.append(f"Timing: {norms.values[displayed[0].name].group} ({displayed[0].norm_source}).")
+        sentences.append(
+            Message(
+                "Timing: {group} ({norm_source}).",
+                group=norms.values[displayed[0].name].group,
+                norm_source=displayed[0].norm_source,
+            )
+        )
     if any(r.norm_note == FEW_NOTE for r in rows):
         sentences.append(FEW_NOTE)
     if any(r.name == SPEED and r.norm is not None for r in rows):
         usual = norms.values[SPEED]
-        sentences.append(f"Gait speed: {GROUPS.get(usual.group, usual.group)} ({usual.source}).")
+        sentences.append(
+            Message(
+                "Gait speed: {group} ({source}).",
+                group=GROUPS.get(usual.group, usual.group),
+                source=usual.source,
+            )
+        )
     if controls is not None:
         sentences.append(_own_note(controls))
     return " ".join(sentences)
@@ -68,18 +86,28 @@ def norm_note(
 def _matched_note(norms: Norms) -> str:
     """Reference group that was asked to walk at this speed, and its limitations."""
     speed = "" if norms.speed is None else f" ({format_number(norms.speed.speed_mps, 2)}\u202fm/s)"
-    return (
-        f"Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). They are not people who are slow from "
-        "habit or age."
+    return Message(
+        "Norm: {ASKED}{speed}, overground, mean ± 1 SD ({SOURCE}). These people were asked to walk at "
+        "this speed; they do not habitually walk slowly.",
+        ASKED=ASKED,
+        speed=speed,
+        SOURCE=SOURCE,
     )
 
 
 def _own_note(controls: ControlGroup) -> str:
     """Description of the clinic's own controls, or that there are too few."""
     if controls.reason is not None:
-        return f"Own controls at the same speed: {controls.n}, too few for a comparison."
+        return Message(
+            "Own controls at the same speed: {controls}, too few for a comparison.", controls=controls.n
+        )
     small = ", a small group" if controls.note == "small_group" else ""
-    return f"Where no published norm is comparable: {controls.group}, {controls.n} people{small}."
+    return Message(
+        "Where no published norm is comparable: {group}, {controls} people{small}.",
+        group=controls.group,
+        controls=controls.n,
+        small=small,
+    )
 
 
 def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]:
@@ -96,12 +124,14 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
         label = labels.get(base if side else name)
         if label is not None:
             offsets.append(f"{label}{side or ''} {format_number(float(np.degrees(value)))}°")
-    about_zero = []
+    about_zero: list[str] = []
     if any(p.zero == "standing" and p.reason is None for p in panels):
         about_zero.append(
-            "Curves relative to standing have the posture during quiet standing at 0°. Subtracted: "
-            f"{', '.join(offsets)}. If the person stands with flexed joints, the curves are offset by "
-            "that amount."
+            Message(
+                "Curves relative to standing have the posture during quiet standing at 0°. Subtracted: "
+                "{offsets}. If the person stands with flexed joints, the curves are offset by that amount.",
+                offsets=", ".join(offsets),
+            )
         )
     if any(p.zero == "walking" and p.reason is None for p in panels):
         about_zero.append(
@@ -123,8 +153,11 @@ def curve_notes(bundle: Bundle, panels: Sequence[CurvePanel]) -> tuple[str, ...]
     most = max((c.n for p in panels for c in p.sides.values()), default=0)
     if most > drawn:
         notes.append(
-            f"Thin lines show {DRAWN_STRIDES} strides per side, spread over the trial; means include all "
-            "strides."
+            Message(
+                "Thin lines show {DRAWN_STRIDES} strides per side, spread over the trial; means include all "
+                "strides.",
+                DRAWN_STRIDES=DRAWN_STRIDES,
+            )
         )
     return tuple(notes)
 
@@ -137,7 +170,17 @@ def _interrupted(panels: Sequence[CurvePanel]) -> list[str]:
         if any(c.mean_deg is not None and np.isnan(c.mean_deg).any() for c in p.sides.values())
     ]
     reason = "interrupted where the knee of the leg model is at its limit in most strides"
-    return [f"{', '.join(broken).capitalize()}: {reason}; nothing is measured there."] if broken else []
+    return (
+        [
+            Message(
+                "{join}: {reason}; no values there.",
+                join=", ".join(broken).capitalize(),
+                reason=reason,
+            )
+        ]
+        if broken
+        else []
+    )
 
 
 def _norm_notes(panels: Sequence[CurvePanel]) -> list[str]:

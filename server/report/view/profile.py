@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.message import Message
 from sagittal.core.norms.profile import Mode
 from sagittal.core.norms.scores import Score, Scores
 from sagittal.server.report.charts.svg import draw_bar, format_coordinate
@@ -17,7 +18,7 @@ from sagittal.server.report.words.change_words import SCORE_TERMS
 from sagittal.server.report.words.wording import VARIABLES, format_number, reason_words
 
 SCALE_DEG: Final = 24.0
-"""Right end of the bars; a GVS of 24° is beyond any pathology in the tables."""
+"""Right end of the bars; a GVS of 24° exceeds all pathologies in the tables."""
 
 WIDTH: Final = 150
 
@@ -31,7 +32,9 @@ LABELS: Final = {v.name: v.label for v in VARIABLES} | {"foot_progression": "Foo
 PLANES: Final = {v.name: v.plane for v in VARIABLES}
 
 MODE: Final[Mode] = "offset_removed"
-"""Our angles start from the person's own standing, so levels say nothing; the shape does."""
+"""Our angles are relative to the patient's own standing posture, so offsets carry no information; the shape
+does.
+"""
 
 
 TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
@@ -40,7 +43,7 @@ TOTALS: Final[tuple[tuple[str, Mode, str], ...]] = (
     ("gps_sagittal_deg", "raw", "Sagittal profile score, with levels"),
     ("gps_deg", "raw", "GPS"),
 )
-"""Profiles over several curves → their titles; those with levels need goniometer angles of standing."""
+"""Profiles over several curves → titles; those with offsets need goniometer angles in standing."""
 
 
 @dataclass(frozen=True)
@@ -221,8 +224,10 @@ def _index(scores: Scores) -> str:
         if s.value is not None:
             parts.append(f"{side} {format_number(s.value)}")
     return (
-        f"GDI*, sagittal: {', '.join(parts)} (100: mean of healthy adults at their own speed; 10 points: "
-        "one SD)."
+        Message(
+            "GDI*, sagittal: {parts} (100: mean of healthy adults at their own speed; 10 points: one SD).",
+            parts=", ".join(parts),
+        )
         if parts
         else ""
     )
@@ -232,18 +237,25 @@ def _note(scores: Scores) -> str:
     gps = scores.find("gps_deg", MODE, "left")
     missing = [LABELS.get(v, v.replace("_", " ").capitalize()).lower() for v in gps.missing]
     without = (
-        f"GPS not available: {', '.join(missing)} ({reason_words(gps.reason)})."
+        Message(
+            "GPS not available: {missing} ({reason}).",
+            missing=", ".join(missing),
+            reason=reason_words(gps.reason),
+        )
         if gps.value is None and missing
         else ""
     )
     people = (
         "healthy adults asked to walk at this speed"
         if scores.speed_matched
-        else f"{scores.reference_n} healthy adults at their own comfortable speed"
+        else Message(
+            "{reference_n} healthy adults at their own comfortable speed", reference_n=scores.reference_n
+        )
     )
-    measured = (
-        f"Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
+    measured = Message(
+        "Root-mean-square deviation of each mean curve from that of {people}. The level of each curve is "
         "removed because angles are relative to the person's standing. Dark: up to the 75th, light: up "
-        "to the 95th percentile of these adults; line: median."
+        "to the 95th percentile of these adults; line: median.",
+        people=people,
     )
     return " ".join(filter(None, (measured, without, f"{scores.source}.")))

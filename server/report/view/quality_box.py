@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final, cast
 
 from sagittal.core.activity.parameters import WORN_H
+from sagittal.core.message import Message
 from sagittal.core.parameters.result import Parameter
 from sagittal.core.plurals import plural
 from sagittal.core.quality import concern_paths_alone, find_shown_level
@@ -28,7 +29,9 @@ CALIBRATION_METHODS: Final[Mapping[str, str]] = {
 }
 """Method of a calibration → words."""
 
-NO_WHOLE_DAY: Final = f"No day has {WORN_H:g} hours of wear time, so no values per day are reported."
+NO_WHOLE_DAY: Final = Message(
+    "No day has {WORN_H:g} hours of wear time, so no values per day are reported.", WORN_H=WORN_H
+)
 IN_DOUBT: Final = "Some values are not reported or are unreliable."
 
 
@@ -207,7 +210,7 @@ def _counted(bundle: Bundle) -> list[QualityItem]:
     if squats:
         done = [p for p in squats if p.n] or squats
         if len(done) == 1:
-            return [QualityItem("Squats included", str(done[0].n), f"{done[0].side} leg")]
+            return [QualityItem("Squats included", str(done[0].n), Message("{side} leg", side=done[0].side))]
         return [_squats_of_both(bundle)]
     steps = _trunk_steps(bundle.parameters)
     if steps and not bundle.strides.strides:
@@ -247,16 +250,20 @@ def _signals(quality: Mapping[str, Any], *, with_rest: bool) -> list[QualityItem
     lost = [(float(s["lost_pct"]), _sensor_name(s)) for s in sensors if s.get("lost_pct") is not None]
     if lost:
         worst, name = max(lost)
-        extra = "" if worst == 0 else f"at most, {name}"
+        extra = "" if worst == 0 else Message("at most, {name}", name=name)
         items.append(QualityItem("Lost samples", f"{format_number(worst, 1)} %", extra))
     still = quality.get("rest_s") if with_rest else None
     if still is not None:
         total = sum(end - start for start, end in still)
-        times = f"in {len(still)} parts" if len(still) > 1 else ""
+        times = Message("in {still} parts", still=len(still)) if len(still) > 1 else ""
         items.append(QualityItem("Standing still", f"{format_number(total, 1)} s", times))
     magnetic = [float(s["magnetic_pct"]) for s in sensors if s.get("magnetic_pct") is not None]
     if magnetic:
-        share = f"disturbed {format_number(max(magnetic))} % of the time" if max(magnetic) >= 1 else "steady"
+        share = (
+            Message("disturbed {format_number} % of the time", format_number=format_number(max(magnetic)))
+            if max(magnetic) >= 1
+            else "steady"
+        )
         items.append(QualityItem("Magnetic field", share, "not used"))
     return items
 
@@ -266,7 +273,7 @@ def _calibration(
 ) -> list[QualityItem]:
     """Calibration method, number of checks passed, and zero of the angles."""
     if calibration is None:
-        # steps of a trunk sensor are read from it as it sits
+        # steps of a trunk sensor are measured without alignment
         return [] if not needed else [QualityItem("Calibration", "not reached", kind="bad")]
     method = CALIBRATION_METHODS.get(calibration["method"], str(calibration["method"]).replace("_", " "))
     if calibration.get("posture") == "walking" and calibration["method"] == "walking_direction":
@@ -275,7 +282,11 @@ def _calibration(
     if verdicts:
         passed = verdicts.count("pass")
         kind = None if passed == len(verdicts) else "warn"
-        value = f"{passed} of {len(verdicts)} {plural(len(verdicts), 'check', 'checks')}"
+        value = Message(
+            f"{{passed}} of {{verdicts}} {plural(len(verdicts), 'check', 'checks')}",
+            passed=passed,
+            verdicts=len(verdicts),
+        )
         items = [QualityItem("Calibration", value, method, kind=kind, page="calibration")]
     else:
         items = [QualityItem("Calibration", method)]

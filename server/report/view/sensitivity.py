@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from sagittal.core.message import Message
 from sagittal.core.squat.joints import JOINTS
 from sagittal.server.report.files.columns import SCHEMA, reduce_to_plain, write_csv
 from sagittal.server.report.words.wording import format_number
 
 if TYPE_CHECKING:
-    # brings numba, which the web process does without
+    # imports numba, which the web process avoids
     from sagittal.core.frames import Floats, Side
     from sagittal.core.squat.sensitivity import SensitivityRow, SensitivityTable
 
@@ -35,14 +36,14 @@ TABLES: Final[tuple[tuple[str, tuple[int, ...], tuple[int, ...], str], ...]] = (
     ("Ankle and knee", (0, 1, 2, 3), (0, 1, 2), "Ankle average"),
     ("Hip", (4, 5, 6), (4, 5, 6), "Hip average"),
 )
-"""Title, columns, the columns that are averaged, and what their average is called."""
+"""Title, columns, averaged columns, and label of their average."""
 
 SHOWN: Final[Mapping[str, str]] = {
     "step": "delta_step_deg",
     "share": "delta_relative_deg",
     "quotient": "sensitivity_pct",
 }
-"""What a table shows → member of a row."""
+"""Displayed quantity → key of a row."""
 
 GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
     (
@@ -85,7 +86,7 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
         },
     ),
 )
-"""The paper's names in words, by what they are of."""
+"""The paper's names in words, by group."""
 
 
 def summarise_sensitivity(
@@ -175,12 +176,18 @@ def tell_sensitivity(summary: Mapping[str, Any]) -> list[str]:
     against = summary["reference"]
     share, steps = f"± {summary['relative_pct']:g} %", _say_steps(summary)
     for leg in summary["legs"]:
-        lines.append(f"{leg['side'].capitalize()} leg")
+        lines.append(Message("{capitalize} leg", capitalize=leg["side"].capitalize()))
         if against is not None:
             errors = (f"{n} {e:.2f}" for n, e in zip(COLUMNS, leg["error_deg"], strict=True))
-            lines += [f"RMS error with nominal values, °: {', '.join(errors)}.", ""]
+            lines += [Message("RMS error with nominal values, °: {errors}.", errors=", ".join(errors)), ""]
             for title, columns, averaged, name in TABLES:
-                lines.append(f"{title}: sensitivity in %, mean of {share} of the nominal value")
+                lines.append(
+                    Message(
+                        "{title}: sensitivity in %, mean of {share} of the nominal value",
+                        title=title,
+                        share=share,
+                    )
+                )
                 rows = [(r["name"], _texts(r["sensitivity_pct"], columns, averaged, 1)) for r in leg["rows"]]
                 rows.append(("Average", _texts(leg["average_pct"], columns, averaged, 1)))
                 lines += _layout((*(COLUMNS[i] for i in columns), name), rows)
@@ -188,7 +195,7 @@ def tell_sensitivity(summary: Mapping[str, Any]) -> list[str]:
         every = tuple(range(len(COLUMNS)))
         for title, member in (
             (f"{heading}, {share}", SHOWN["share"]),
-            (f"{heading}, by {steps}", SHOWN["step"]),
+            (Message("{heading}, by {steps}", heading=heading, steps=steps), SHOWN["step"]),
         ):
             lines.append(title)
             lines += _layout(COLUMNS, [(r["name"], _texts(r[member], every, (), 3)) for r in leg["rows"]])
@@ -199,7 +206,9 @@ def tell_sensitivity(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _say_steps(summary: Mapping[str, Any]) -> str:
-    return f"steps of {summary['step_mm']:g} mm and {summary['step_deg']:g}°"
+    return Message(
+        "steps of {step_mm:g} mm and {step_deg:g}°", step_mm=summary["step_mm"], step_deg=summary["step_deg"]
+    )
 
 
 def _texts(
@@ -283,7 +292,14 @@ REASONS: Final[Mapping[str | None, str]] = {
 def view_sensitivity(content: bytes, selected: str) -> SensitivityView:
     """View of a {stem}.json; an unavailable `selected` is replaced by "step"."""
     summary = json.loads(content)
-    choices = [("step", f"{summary['step_mm']:g} mm and {summary['step_deg']:g}°")]
+    choices: list[tuple[str, str]] = [
+        (
+            "step",
+            Message(
+                "{step_mm:g} mm and {step_deg:g}°", step_mm=summary["step_mm"], step_deg=summary["step_deg"]
+            ),
+        )
+    ]
     choices.append(("share", f"± {summary['relative_pct']:g} %"))
     if summary["reference"] is not None:
         choices.append(("quotient", "Sensitivity in %"))
@@ -305,13 +321,21 @@ def _speak(data: Mapping[str, Any]) -> Iterator[str]:
     largest = {title: _find_largest(data, names) for title, names in GROUPS}
     noun = "error changes" if data["reference"] is not None else "angle changes"
     turn, place, body = (largest[title] for title, _ in GROUPS)
-    yield (
-        f"A sensor turned by {data['step_deg']:g}° matters most: an {noun} by up to "
-        f"{format_number(turn[0], 1)}° ({turn[1]})."
+    yield Message(
+        "Sensor misalignment matters most: {step_deg:g}° changes an {noun} by up to {format_number}° "
+        "({turn}).",
+        step_deg=data["step_deg"],
+        noun=noun,
+        format_number=format_number(turn[0], 1),
+        turn=turn[1],
     )
-    yield (
-        f"A sensor displaced by {data['step_mm']:g} mm: up to {format_number(place[0], 2)}°. A body "
-        f"dimension off by {data['step_mm']:g} mm: up to {format_number(body[0], 2)}°."
+    yield Message(
+        "A sensor displaced by {step_mm:g} mm: up to {format_number}°. A body dimension off by "
+        "{step_mm2:g} mm: up to {format_number2}°.",
+        step_mm=data["step_mm"],
+        format_number=format_number(place[0], 2),
+        step_mm2=data["step_mm"],
+        format_number2=format_number(body[0], 2),
     )
 
 

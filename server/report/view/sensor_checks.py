@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.words.wording import format_number, place_words
 
 NOT_JUDGED: Final = "cannot be assessed"
@@ -41,7 +42,10 @@ def sensor_checks(checks: Mapping[str, Any] | None) -> SensorChecks | None:
     if checks is None or len(checks["sensors"]) < 2:
         return None
     rows = tuple(_row(s) for s in checks["sensors"])
-    pairs = [f"{place_words(a)} and {place_words(b)}" for a, b in checks["exchanged"]]
+    pairs = [
+        Message("{value} and {value2}", value=place_words(a), value2=place_words(b))
+        for a, b in checks["exchanged"]
+    ]
     unclear = [s for s in checks["sensors"] if s.get("place_judged_s") is None]
     notes = []
     if any(s["sensor"] == "pelvis" for s in unclear):
@@ -73,25 +77,43 @@ def _clock(s: Mapping[str, Any]) -> tuple[str, str]:
     if s["drift_ms"] is not None:
         which = "slow" if s["drift_ms"] > 0 else "fast"
         return (
-            f"Clock runs {which}, {format_number(abs(s['drift_ms']))}\u202fms over the trial, {done}",
+            Message(
+                "Clock runs {which}, {format_number}\u202fms over the trial, {done}",
+                which=which,
+                format_number=format_number(abs(s["drift_ms"])),
+                done=done,
+            ),
             "warn",
         )
     if s["lag_ms"] is not None:
         which = "late" if s["lag_ms"] > 0 else "early"
-        return f"Clock {format_number(abs(s['lag_ms']))}\u202fms {which}, {done}", "warn"
+        return Message(
+            "Clock {format_number}\u202fms {which}, {done}",
+            format_number=format_number(abs(s["lag_ms"])),
+            which=which,
+            done=done,
+        ), "warn"
     if s.get("clock_doubted"):
         return "Clock appears wrong, see notices", "warn"
-    return ("Clock agrees", "ok") if s["clock_judged"] else (f"Clock {NOT_JUDGED}", "")
+    return (
+        ("Clock agrees", "ok")
+        if s["clock_judged"]
+        else (Message("Clock {NOT_JUDGED}", NOT_JUDGED=NOT_JUDGED), "")
+    )
 
 
 def _place(s: Mapping[str, Any]) -> tuple[str, str]:
     if s["slip_deg"] is not None:
         return (
-            f"Slipped {format_number(abs(s['slip_deg']))}° about {format_number(s['slip_at_s'])}\u202fs",
+            Message(
+                "Slipped {format_number}° about {format_number2}\u202fs",
+                format_number=format_number(abs(s["slip_deg"])),
+                format_number2=format_number(s["slip_at_s"]),
+            ),
             "warn",
         )
-    # an older version did not say from when to when it could judge
+    # older versions did not store the period of the check
     if (duration_s := s.get("place_judged_s")) is None:
-        return f"Placement {NOT_JUDGED}", ""
+        return Message("Placement {NOT_JUDGED}", NOT_JUDGED=NOT_JUDGED), ""
     start, end = (format_number(x) for x in duration_s)
-    return f"Stayed from {start} to {end}\u202fs", "ok"
+    return Message("Stayed from {start} to {end}\u202fs", start=start, end=end), "ok"

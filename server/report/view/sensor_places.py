@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from sagittal.core.message import Message
 from sagittal.server.report.words.wording import format_number, place_words
 
 OFF_SD: Final = 2.0
-"""A place further from the nominal one than so many standard deviations is told."""
+"""Deviations from the nominal position above this number of standard deviations are reported."""
 
 AXES: Final = ("forward", "up", "outward")
 
@@ -57,7 +58,7 @@ JOINTS: Final = {
     ("right", "knee"): "Right knee",
     ("right", "ankle"): "Right ankle",
 }
-"""Side and joint → what it is called."""
+"""Side and joint → label."""
 
 
 def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
@@ -71,7 +72,11 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
         ),
         joints=tuple(
             _view_place(
-                f"{JOINTS[x['side'], x['joint']]}, in the {place_words(x['segment'])}",
+                Message(
+                    "{joint}, in the {place_words}",
+                    joint=JOINTS[x["side"], x["joint"]],
+                    place_words=place_words(x["segment"]),
+                ),
                 x["side"] == "left",
                 x,
                 [x["measured"]] * len(AXES),
@@ -80,7 +85,7 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
         ),
         knees=tuple(
             KneeAxisRow(
-                f"{side} knee".capitalize(),
+                Message("{side} knee", side=side).capitalize(),
                 _write_turn(x["thigh_deg"], x["thigh_sd_deg"]),
                 _write_turn(x["shank_deg"], x["shank_sd_deg"]),
             )
@@ -90,7 +95,7 @@ def view_sensor_places(stored: Mapping[str, Any] | None) -> SensorPlaces | None:
 
 
 def _view_place(title: str, left: bool, stored: Mapping[str, Any], measured: Sequence[bool]) -> PlaceRow:
-    # outward is to the left on the left
+    # lateral is to the left on the left side
     out = (1.0, 1.0, -1.0 if left else 1.0)
     estimate, guess = ([a * b for a, b in zip(stored[k], out, strict=True)] for k in ("cm", "guess_cm"))
     spread = stored["sd_cm"]

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.frames import SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.squat.curves import VALGUS, cut_curves
 from sagittal.core.squat.repetitions import FOOT_LIFTED
 from sagittal.server.report.charts.curves import SQUAT, cycle_svg
@@ -34,16 +35,16 @@ VARIABLES: Final = (
     Variable("hip_adduction", "Hip adduction", "frontal", *ASIDE),
     Variable("hip_rotation", "Hip rotation", "transverse", *TURN),
 )
-"""Charts of a squat; the knee bends further than in walking, so the axes are their own."""
+"""Charts of a squat; the knee flexes more than in walking, so the axes differ."""
 
 NORM_NOTE: Final = "There is no norm for squats."
 
 SURE: Final = ("knee_flexion", "hip_flexion", "ankle_dorsiflexion")
-"""Of the others the level is not, or less surely, known (docs/science/squat.md, "Limits")."""
+"""Variables with a reliable offset (docs/science/squat.md, "Limits")."""
 
 
 UNSURE_FIGURES: Final = ("squat_knee_valgus", "squat_hip_adduction", "squat_hip_rotation")
-"""Beginnings of the figures that are read from these others."""
+"""Prefixes of parameters derived from the other variables."""
 
 
 @dataclass(frozen=True)
@@ -98,15 +99,20 @@ class SquatView:
     @property
     def title(self) -> str:
         """Legs that performed squats, in words."""
-        return f"{self.sides[0]} leg" if len(self.sides) == 1 else "both legs"
+        return Message("{sides} leg", sides=self.sides[0]) if len(self.sides) == 1 else "both legs"
 
     @property
     def not_listed(self) -> str:
         """Repetitions not listed, in a sentence; empty if there are none."""
-        legs = [f"{n} of the {side} knee" for side, n in self.lifted.items() if n]
+        legs = [
+            Message("{value} of the {side} knee", value=n, side=side) for side, n in self.lifted.items() if n
+        ]
         if not legs:
             return ""
-        return f"Knee flexion with the foot off the floor is not counted as a squat: {' and '.join(legs)}."
+        return Message(
+            "Knee flexion with the foot off the floor is not counted as a squat: {legs}.",
+            legs=" and ".join(legs),
+        )
 
     def to_json(self) -> dict[str, object]:
         """Content of the report's JSON; curves are in angles.parquet, values in repetitions.csv."""

@@ -38,7 +38,7 @@ from sagittal.server.report.words.headline_phrases import (
 from sagittal.server.report.words.wording import format_number, parameter_term, round_difference
 
 NEARLY: Final = 0.8
-"""A difference of the sides is told before one from the norm unless that is larger by more than this."""
+"""A side difference takes precedence over a deviation from the norm from this fraction of its size on."""
 
 AT_SPEED: Final = "people at this speed"
 
@@ -83,7 +83,7 @@ def _of_row(row: ParameterRow, norms: Norms) -> Iterator[HeadlineSentence]:
     z_of = {side: z for side in SIDES if (z := _certain_z(row, _cell(row, side))) is not None}
     apart = _of_sides(row, p, norms)
     if len(z_of) == len(SIDES) and (apart is None or apart.size <= 1.0):
-        # sides that cannot be told apart speak together
+        # sides without a clear difference are reported together
         mean = sum(z_of.values()) / len(SIDES)
         if abs(mean) > BEYOND_SD:
             yield from _against_norm(row, p, OF_BOTH, mean)
@@ -156,13 +156,13 @@ def _of_sides(row: ParameterRow, p: Phrases, norms: Norms) -> HeadlineSentence |
     if side is None:
         return None
     apart = round_difference(row.left.value, row.right.value, parameter_term(name))
-    own, other = (row.left, row.right) if side == "left" else (row.right, row.left)
+    own, opposite = (row.left, row.right) if side == "left" else (row.right, row.left)
     words = {
         "noun": p.noun,
         "word": p.more if (side == larger) == (p.sign > 0) else p.less,
         "d": _number(row, apart),
         "v": _number(row, p.sign * own.value),
-        "o": _number(row, p.sign * other.value),
+        "o": _number(row, p.sign * opposite.value),
         "norm": _norm_words(row, p),
     }
     return make_sentence(row.name, p.family, "sides", size, OF_SIDES, words, side)

@@ -9,6 +9,7 @@ from typing import Final
 
 from sagittal.core.events.result import COMPARED
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.core.norms.kinematics import Zero
 from sagittal.core.norms.lookup import Norms
 from sagittal.core.norms.values import NormValue
@@ -33,15 +34,17 @@ from sagittal.server.report.words.wording import (
 )
 
 NOBODY: Final = Norms(None, None)
-"""No reference people at all."""
+"""No reference group."""
 
 
-FEW_NOTE: Final = f"No norm: at least {COMPARED} strides per side are needed for a comparison."
+FEW_NOTE: Final = Message(
+    "No norm: at least {COMPARED} strides per side are needed for a comparison.", COMPARED=COMPARED
+)
 """What stands in place of a norm where no side has enough strides."""
 
 
 BEYOND_SD: Final = 2.0
-"""A value further from the norm's mean is beyond what healthy people vary by."""
+"""z-score outside the normal range."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +156,7 @@ class ParameterRow:
         if self.norm_mean is None or self.norm_sd is None:
             marks = {key: cell.value for key, cell in cells.items() if cell is not None}
             return range_svg(marks, None, self.scale)
-        # a side of too few strides is not put over the norm of the other
+        # a side with too few strides is not shown with the norm of the other
         marks = {key: cell.value for key, cell in cells.items() if cell is not None and not cell.few}
         return range_svg(marks, (self.norm_mean, self.norm_sd), self.scale)
 
@@ -300,10 +303,25 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     spread = "" if p.sd is None else f" ± {format_number(p.sd, _sd_digits(term))}"
     cycle_name = name_counted(p.name)
     cycles = plural(p.n, cycle_name.removesuffix("s"), cycle_name)
-    title_parts = [f"{format_number(p.mean, digits)}{spread}\u202f{term.unit}, mean ± SD of {p.n} {cycles}"]
+    title_parts: list[str] = [
+        Message(
+            "{mean}{spread}\u202f{unit}, mean ± SD of {value} {cycles}",
+            mean=format_number(p.mean, digits),
+            spread=spread,
+            unit=term.unit,
+            value=p.n,
+            cycles=cycles,
+        )
+    ]
     ci = None if p.ci_low is None or p.ci_high is None else (p.ci_low, p.ci_high)
     if ci is not None:
-        title_parts.append(f"95 % CI {format_number(ci[0], digits)} to {format_number(ci[1], digits)}")
+        title_parts.append(
+            Message(
+                "95 % CI {format_number} to {format_number2}",
+                format_number=format_number(ci[0], digits),
+                format_number2=format_number(ci[1], digits),
+            )
+        )
     if p.cv_pct is not None:
         title_parts.append(
             f"CV {format_number(p.cv_pct, 1)} %{f' of few {cycle_name}' if p.note == 'few_strides' else ''}"
@@ -312,7 +330,11 @@ def _cell(p: Parameter | None, term: Term, norms: Norms) -> TableCell | None:
     place = norms.place(p.name, p.mean if enough else None, p.uncertainty)
     if place.z is not None and place.percentile is not None:
         title_parts.append(
-            f"z {format_number(place.z, 1)}, percentile {format_number(place.percentile)} of the norm"
+            Message(
+                "z {place}, percentile {percentile} of the norm",
+                place=format_number(place.z, 1),
+                percentile=format_number(place.percentile),
+            )
         )
     return TableCell(
         p.mean,
@@ -339,9 +361,14 @@ def _known_by(p: Parameter, term: Term) -> str:
     measured = NORMAL_95 * hypot(p.u_own, p.u_common)
     digits = max(term.digits, 1)
     if p.uncertainty is None:
-        return (
-            f"± not known: {p.n} of {name_counted(p.name)} does not say how they differ; "
-            f"{entry.errors.source} ± {format_number(measured, digits)}\u202f{term.unit} (95 %)"
+        return Message(
+            "± not known: {value} of {name} does not say how they differ; {source} ± {measured}\u202f"
+            "{unit} (95 %)",
+            value=p.n,
+            name=name_counted(p.name),
+            source=entry.errors.source,
+            measured=format_number(measured, digits),
+            unit=term.unit,
         )
     strides = sqrt(max(p.uncertainty**2 - measured**2, 0.0))
     return (

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from sagittal.core.change import NOT_MEASURED_ALIKE, UNLIKE, Change
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.variability import TOO_FEW
 from sagittal.server.report.words.wording import Term, format_number, parameter_term, title_of
@@ -32,7 +33,7 @@ SCORE_TERMS: Final[Mapping[str, Term]] = {
         "GDI*, sagittal", "points", "Deviation from healthy adults", 0, (40, 120), ("larger", "smaller")
     ),
 }
-"""Scores that are followed over visits, after the parameters: shape of the curves, offsets removed."""
+"""Scores followed over visits, after the parameters: shape of the curves without offsets."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +100,24 @@ def limit_words(change: Change) -> tuple[str, ...]:
     sentences = []
     if change.limit is not None:
         people = f" ({change.people})" if change.people else ""
-        sentences.append(f"MDC {format_limit(change.limit, term)}{unit}: {change.limit_source}{people}.")
+        sentences.append(
+            Message(
+                "MDC {limit}{unit}: {limit_source}{people}.",
+                limit=format_limit(change.limit, term),
+                unit=unit,
+                limit_source=change.limit_source,
+                people=people,
+            )
+        )
     if change.mcid is not None:
-        sentences.append(f"MCID {format_limit(change.mcid, term)}{unit}: {change.mcid_source}.")
+        sentences.append(
+            Message(
+                "MCID {mcid}{unit}: {mcid_source}.",
+                mcid=format_limit(change.mcid, term),
+                unit=unit,
+                mcid_source=change.mcid_source,
+            )
+        )
     return tuple(sentences)
 
 

@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from sagittal.core.activity.result import ActivityKind, ActivityResult, TransitionKind, TransitionRefusal
+from sagittal.core.message import Message
 
 DAY_S: Final = 86400.0
 HOUR_S: Final = 3600.0
@@ -41,7 +42,7 @@ KIND_WORDS: Final[Mapping[ActivityKind, str]] = {
     "non_wear": "no movement for at least half an hour, not even breathing",
     "gap": "the device stored no samples",
 }
-"""How each kind is told, in the words of its definition (docs/science/activity.md)."""
+"""Activity → how it is recognized, in the words of its definition (docs/science/activity.md)."""
 
 WALKED: Final[tuple[ActivityKind, ...]] = ("walking", "stairs_up", "stairs_down")
 
@@ -54,7 +55,7 @@ TOTALS: Final[Mapping[str, tuple[ActivityKind, ...]]] = {
     "Not worn": ("non_wear",),
     "Not recorded": ("gap",),
 }
-"""Columns of the totals → what they add up."""
+"""Columns of the totals → activities they sum."""
 
 TRANSITION_LABELS: Final[Mapping[TransitionKind, str]] = {
     "sit_to_stand": "Sit to stand",
@@ -101,7 +102,7 @@ def find_day_label(activity: ActivityResult, at_s: float) -> str:
 
 def day_label(number: int, date: dt.date | None) -> str:
     """Name a day by its date, "Mon 16 Nov", or by its number."""
-    return f"Day {number + 1}" if date is None else f"{date:%a} {date.day} {date:%b}"
+    return Message("Day {number}", number=number + 1) if date is None else f"{date:%a} {date.day} {date:%b}"
 
 
 def _since_midnight(activity: ActivityResult) -> float:

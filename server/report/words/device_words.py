@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from math import degrees
 from typing import Final
 
+from sagittal.core.message import Message
 from sagittal.core.quality.device_course import DeviceCourse, DeviceFinding
 from sagittal.core.quality.devices import DeviceCheck
 from sagittal.server.report.words.wording import format_number
@@ -27,7 +28,7 @@ ADVICE: Final = {
     "gyro_noise": "Check strap and case. Tremor of the wearer has the same effect.",
     "acc_noise": "Check strap and case. Tremor of the wearer has the same effect.",
 }
-"""Quantity of a finding → what to do."""
+"""Quantity of a finding → remedy."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,13 @@ def judge_device(
     late: tuple[str, ...] = ()
     if checks[-1].reason is not None:
         cause = NOT_MEASURED[checks[-1].reason]
-        late = (f"Measured last on {day(days[course.newest])}, not in its newest take. {cause}",)
+        late = (
+            Message(
+                "Last measured on {day}, not in its latest trial. {cause}",
+                day=day(days[course.newest]),
+                cause=cause,
+            ),
+        )
     if course.findings:
         texts = [_tell(f, days) for f in course.findings]
         prefixes = ["" if text == texts[0] else f"{text}. " for text in texts]
@@ -65,19 +72,36 @@ def judge_device(
 
 
 def _tell(f: DeviceFinding, days: Sequence[dt.date]) -> str:
-    since = "" if f.since is None else f" since {day(days[f.since])}"
+    since = "" if f.since is None else Message(" since {day}", day=day(days[f.since]))
     if f.quantity == "gyro_bias":
-        return f"Bias moved by {format_number(degrees(f.value), 1)} °/s{since}"
+        return Message(
+            "Bias moved by {format_number} °/s{since}",
+            format_number=format_number(degrees(f.value), 1),
+            since=since,
+        )
     if f.quantity == "scale":
         percent = format_number(100 * abs(f.value), 1)
         if f.since is None:
-            return f"Gravity reads {percent} % more" if f.value > 0 else f"Gravity reads {percent} % less"
+            return (
+                Message("Gravity reads {percent} % more", percent=percent)
+                if f.value > 0
+                else Message("Gravity reads {percent} % less", percent=percent)
+            )
         moved = day(days[f.since])
         if f.value > 0:
-            return f"Gravity reads {percent} % more since {moved}"
-        return f"Gravity reads {percent} % less since {moved}"
+            return Message("Gravity reads {percent} % more since {moved}", percent=percent, moved=moved)
+        return Message("Gravity reads {percent} % less since {moved}", percent=percent, moved=moved)
     if f.quantity == "scale_off":
         way = "much" if f.value > 0 else "little"
-        return f"Gravity reads {format_number(100 * abs(f.value), 1)} % too {way}"
+        return Message(
+            "Gravity reads {format_number} % too {way}",
+            format_number=format_number(100 * abs(f.value), 1),
+            way=way,
+        )
     sensor_kind = "Gyroscope" if f.quantity == "gyro_noise" else "Accelerometer"
-    return f"{sensor_kind} noise {format_number(f.value, 1)} times its usual{since}"
+    return Message(
+        "{sensor_kind} noise {value} times its usual{since}",
+        sensor_kind=sensor_kind,
+        value=format_number(f.value, 1),
+        since=since,
+    )

@@ -15,6 +15,7 @@ from sagittal.core.estimators import (
     NO_FIGURE_NOTE,
     PaperReference,
 )
+from sagittal.core.message import Message
 from sagittal.server.report.words.wording import format_number, place_words
 
 KINDS: Final[Mapping[str, str]] = {"good": "ok", "warn": "warn", "bad": "bad"}
@@ -24,7 +25,7 @@ VERDICTS: Final[Mapping[str, str]] = {
     "bad": "inconsistent",
 }
 NOT_JUDGED: Final = "has no self-check"
-"""Of an estimator that has no quantity with a limit."""
+"""For an estimator without health limits."""
 
 REDUCED: Final[Mapping[str, str]] = {
     "sensor_failed": "reduced: a sensor failed in this trial",
@@ -59,7 +60,7 @@ QUANTITIES: Final[Mapping[str, tuple[str, int, str]]] = {
 """Name of a finding → label, decimals, unit."""
 
 HIDDEN: Final = ("min_eigenvalue",)
-"""For those who check numbers: in analysis.json, not on the page."""
+"""Measures for verification: in analysis.json, not on the page."""
 
 
 @dataclass(frozen=True)
@@ -159,10 +160,12 @@ def _estimated(angles: frozenset[str]) -> str:
     joints = sorted({a.split("_")[0] for a in angles})
     sides = {"l": "left", "r": "right"}
     on = sorted({sides[a[-1]] for a in angles if a[-2:] in ("_l", "_r")})
-    region = "both sides" if len(on) > 1 else f"the {on[0]} side" if on else "the pelvis"
-    return (
-        f"{', '.join(joints).capitalize()} angles of {region} are estimated by the leg model, not measured "
-        "by two sensors: low confidence."
+    region = "both sides" if len(on) > 1 else Message("the {on} side", on=on[0]) if on else "the pelvis"
+    return Message(
+        "{join} angles of {region} are estimated by the leg model rather than measured by two sensors: "
+        "low confidence.",
+        join=", ".join(joints).capitalize(),
+        region=region,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Final
 
 from sagittal.core.feedback import Prescription
 from sagittal.core.frames import Side
+from sagittal.core.message import Message
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.plurals import plural
 from sagittal.server.report.words.wording import Term, format_number, parameter_term
@@ -63,7 +64,7 @@ def prescription_words(content: Prescription) -> list[tuple[str, str]]:
         ("Trained", name_target(content)),
         ("Target", target_words(content)),
         ("Zone", _zone(content)),
-        ("Shown as", _shown(content)),
+        ("Display name", _shown(content)),
         ("Schedule", schedule_words(content)),
         ("Level", _level(content)),
         ("Ends", _ends(content)),
@@ -78,35 +79,60 @@ def schedule_words(content: Prescription) -> str:
         text = "every stride"
     else:
         shares = " → ".join(f"{p}{NBSP}%" for p in s.shares_pct)
-        text = f"{shares} of the strides"
+        text = Message("{shares} of the strides", shares=shares)
         if len(s.shares_pct) > 1:
-            text = f"{shares} of the strides, {s.strides_per_share} strides each"
+            text = Message(
+                "{shares} of the strides, {strides_per_share} strides each",
+                shares=shares,
+                strides_per_share=s.strides_per_share,
+            )
     if s.probe_every is not None:
-        text += f"; after every {s.probe_every}, {s.probe_strides} without"
+        text += Message(
+            "; after every {probe_every}, {probe_strides} without",
+            probe_every=s.probe_every,
+            probe_strides=s.probe_strides,
+        )
     if s.retention_strides:
-        text += f"; a visit after a training starts with {s.retention_strides} without"
+        text += Message(
+            "; a visit after a training starts with {retention_strides} without",
+            retention_strides=s.retention_strides,
+        )
     return text
 
 
 def _zone(content: Prescription) -> str:
-    return f"target ± {content.band_sd:g} SD; each level is {content.progression.sd_per_level:g} SD wider"
+    return Message(
+        "target ± {band_sd:g} SD; each level is {sd_per_level:g} SD wider",
+        band_sd=content.band_sd,
+        sd_per_level=content.progression.sd_per_level,
+    )
 
 
 def _shown(content: Prescription) -> str:
     text = ", ".join(MODE_WORDS[m] for m in content.modes)
     if content.positive_only:
-        return f"{text}; only strides in the zone"
-    return f"{text}; only strides outside the zone" if content.bandwidth else text
+        return Message("{text}; only strides in the zone", text=text)
+    return Message("{text}; only strides outside the zone", text=text) if content.bandwidth else text
 
 
 def _level(content: Prescription) -> str:
     p = content.progression
-    start = "as difficult as the last walk allows" if p.start_level is None else f"at level {p.start_level}"
+    start = (
+        "as difficult as the last walk allows"
+        if p.start_level is None
+        else Message("at level {start_level}", start_level=p.start_level)
+    )
     if not p.automatic:
-        return f"starts {start}; changed manually"
-    return (
-        f"starts {start}; harder when more than {100 * p.share:g}{NBSP}% of {p.window} strides are in the "
-        f"zone, easier when more than {100 * p.away_share:g}{NBSP}% are far off target"
+        return Message("starts {start}; changed manually", start=start)
+    return Message(
+        "starts {start}; harder when more than {share:g}{NBSP}% of {window} strides are in the zone, "
+        "easier when more than {away_share:g}{NBSP2}% are far off target",
+        start=start,
+        share=100 * p.share,
+        NBSP=NBSP,
+        window=p.window,
+        away_share=100 * p.away_share,
+        NBSP2=NBSP,
     )
 
 
@@ -114,11 +140,18 @@ def _ends(content: Prescription) -> str:
     r = content.stop_rule
     conditions = []
     if r.max_minutes is not None:
-        conditions.append(f"after {r.max_minutes:g} min")
+        conditions.append(Message("after {max_minutes:g} min", max_minutes=r.max_minutes))
     if r.max_strides is not None:
-        conditions.append(f"after {r.max_strides} {plural(r.max_strides, 'stride', 'strides')}")
+        conditions.append(
+            Message(
+                f"after {{max_strides}} {plural(r.max_strides, 'stride', 'strides')}",
+                max_strides=r.max_strides,
+            )
+        )
     if r.gps_rise_deg is not None:
-        conditions.append(f"when the sagittal profile score rises by {r.gps_rise_deg:g}°")
+        conditions.append(
+            Message("when the sagittal profile score rises by {gps_rise_deg:g}°", gps_rise_deg=r.gps_rise_deg)
+        )
     return ", ".join(conditions) or "when the therapist stops it"
 
 
@@ -127,7 +160,9 @@ def _watched(content: Prescription) -> str:
     parts = []
     if content.side is not None:
         limit = "its MDC" if g.other_change is None else format_quantity(g.other_change, term)
-        parts.append(f"a change of the other side by {limit}")
+        parts.append(Message("a change of the other side by {limit}", limit=limit))
     if g.gps_rise_deg is not None:
-        parts.append(f"a rise of the sagittal profile score by {g.gps_rise_deg:g}°")
+        parts.append(
+            Message("a rise of the sagittal profile score by {gps_rise_deg:g}°", gps_rise_deg=g.gps_rise_deg)
+        )
     return ", ".join(parts) or "nothing"

@@ -11,16 +11,16 @@ from sagittal.core.fusion.algorithms.choice import OWN
 from sagittal.core.fusion.algorithms.listed import ALGORITHMS, ENGINES, GRADES
 
 OWN_ENGINE: Final = "Sagittal"
-"""The group of the project's own filters, beside the six engines."""
+"""Group of our own filters, next to the six engines."""
 
 NEEDS: Final[Mapping[str, str]] = {"needed": "needs a magnetometer", "unused": "uses no magnetometer"}
-"""What is not the rule: most use one where there is one."""
+"""Deviations from the rule that most filters use a magnetometer if available."""
 
 PROPOSED: Final = (
     *(o.name for o in OWN), "madgwick_2011_imu", "choukroun_2006", "sabatini_2006", "srckf", "markley_2003",
     "hyyti_2015",
 )  # fmt: skip
-"""Chosen until somebody chooses: our own, and one of each engine that runs without a magnetometer."""
+"""Default selection: our own, and one of each engine that works without a magnetometer."""
 
 
 @dataclass(frozen=True)

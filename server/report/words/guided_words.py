@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from sagittal.core.message import Message
+
 TOTAL: Final[Mapping[str, str]] = {
     "tug": "tug_duration_s",
     "five_sit_to_stand": "five_sit_to_stand_s",
@@ -13,7 +15,7 @@ TOTAL: Final[Mapping[str, str]] = {
     "standing_eyes_open": "sway_rms_mps2",
     "standing_eyes_closed": "sway_rms_mps2",
 }
-"""Guided protocol → the figure that stands for it."""
+"""Guided protocol → main parameter."""
 
 _UPRIGHT: Final = "The test has started. Keep standing still."
 
@@ -41,15 +43,15 @@ SAYS: Final[Mapping[str, Mapping[str, str]]] = {
     "standing_eyes_open": {
         "get_ready": "Stand still, arms at your sides, and look straight ahead.",
         "ready": "Stand still.",
-        "running": f"{_UPRIGHT} Eyes open.",
+        "running": Message("{UPRIGHT} Eyes open.", UPRIGHT=_UPRIGHT),
     },
     "standing_eyes_closed": {
         "get_ready": "Stand still, arms at your sides. Someone is next to you. Close your eyes.",
         "ready": "Stand still.",
-        "running": f"{_UPRIGHT} Eyes closed.",
+        "running": Message("{UPRIGHT} Eyes closed.", UPRIGHT=_UPRIGHT),
     },
 }
-"""What the person is told: protocol → phase → words."""
+"""Instruction to the subject: protocol → phase → words."""
 
 HINTS: Final[Mapping[str, str]] = {
     "tug": "The clock starts with the first lean forward and stops when the person sits again.",
@@ -63,7 +65,7 @@ HINTS: Final[Mapping[str, str]] = {
         "Press Go. The clock starts after two seconds of quiet standing and stops after 30 s."
     ),
 }
-"""How a test begins and ends."""
+"""Start and end of a test."""
 
 OVER: Final = "The test is over. You may rest."
 

@@ -27,7 +27,7 @@ NAMES: Final[Mapping[str, str]] = {
     "swing_asymmetry": "Longer swing over shorter swing",
     "temporal_asymmetry": "Swing over stance, larger side over smaller",
 }
-"""Rule → what is held against its limit."""
+"""Rule → measured quantity."""
 
 if _unnamed := {rule.name for rule in RULES} - set(NAMES):
     raise ValueError(f"server.report.limits has no words for the rules {', '.join(sorted(_unnamed))}.")
@@ -46,7 +46,7 @@ REASONS: Final[Mapping[str, str]] = {
     "too_few_strides": "too few strides to assess",
     "sides_alike": "strides and measurement error do not show a difference between sides",
 }
-"""Why a value cannot be held against its limit; other codes as in the table."""
+"""Why a value cannot be compared with its limit; other codes as in the table."""
 
 UNITS: Final[Mapping[str, tuple[str, int]]] = {"deg": ("°", 0), "m": ("\u202fm", 3), "": ("", 2)}
 

@@ -103,7 +103,7 @@ ZERO_WORDS: Final[Mapping[str, str]] = {
     "walking": "from the mean in walking",
     "stride_mean": "from its mean over the stride",
 }
-"""Zero of an angle → what is added to its title."""
+"""Zero of an angle → addition to its title."""
 
 
 def title_of(name: str, label: str, zero: str = "standing") -> str:
@@ -168,7 +168,7 @@ REASONS: Final[Mapping[str, str]] = {
     "tibia_not_vertical": "not measured: the shank does not pass the vertical in swing",
     "not_reached": "not measured: this analysis has no joint angles",
 }
-"""Reason code → words in place of a number."""
+"""Reason code → text instead of a number."""
 
 EXCLUDED: Final[Mapping[str, str]] = {
     "incomplete": "incomplete",
@@ -182,14 +182,14 @@ EXCLUDED: Final[Mapping[str, str]] = {
     "outlier": "atypical",
     "non_periodic": "not periodic",
 }
-"""Code of a stride left out → words."""
+"""Exclusion code of a stride → words."""
 
 GROUPS: Final[Mapping[str, str]] = {
     "adult_21_84": "adults 21–84 years",
     "adult_21_54": "adults 21–54 years",
     "adult_55_84": "adults 55–84 years",
 }
-"""Group of a reference → its people in words."""
+"""Reference group → its description."""
 
 NO_NORM: Final[Mapping[str, str]] = {
     "no_norm_for_age": "No norm for this age: the reference people are adults.",
@@ -197,7 +197,7 @@ NO_NORM: Final[Mapping[str, str]] = {
     "age_unknown": "No norm for timing: enter the year of birth.",
     "sex_unknown": "No norm for timing: enter the sex.",
 }
-"""Why there is no reference at all."""
+"""Why there is no reference."""
 
 
 def reason_words(code: str | None) -> str:
@@ -220,6 +220,8 @@ def speak_places(text: str) -> str:
     """
     if isinstance(text, Message):
         return text.map_words(speak_places)
+    if isinstance(text, Message):
+        return text.map_words(speak_places)
     return _SIDED.sub(lambda found: place_words(found[0]), text)
 
 
@@ -231,7 +233,7 @@ NOT_COUNTED: Final[Mapping[str, str]] = {
     "foot_moved": "the foot moved",
     "foot_lifted": "the foot was off the floor",
 }
-"""Why a squat does not count → words."""
+"""Why a squat is excluded → words."""
 
 
 def explain_repetition(code: str) -> str:
@@ -269,10 +271,16 @@ def symmetry_words(s: Symmetry) -> str:
     if s.ratio is None or s.index_pct is None or s.angle_pct is None:
         return "a side is too near zero for a ratio" if s.reason == "near_zero" else ""
     first, second = s.reference.split("/")
-    return (
-        f"{first} / {second} {format_number(s.ratio, 2)}, "
-        f"symmetry index {_signed(s.index_pct)} % (positive: {first} "
-        f"larger), symmetry angle {_signed(s.angle_pct)} % (negative: {first} larger)"
+    return Message(
+        "{first} / {second} {ratio}, symmetry index {index_pct} % (positive: {first2} larger), "
+        "symmetry angle {angle_pct} % (negative: {first3} larger)",
+        first=first,
+        second=second,
+        ratio=format_number(s.ratio, 2),
+        index_pct=_signed(s.index_pct),
+        first2=first,
+        angle_pct=_signed(s.angle_pct),
+        first3=first,
     )
 
 
@@ -314,9 +322,9 @@ JUDGED: Final[Mapping[str | None, str]] = {
     "warn": "The pose estimator considers part of its result unreliable.",
     "bad": "The sensors contradict each other, so the estimated poses are unreliable.",
 }
-"""Verdict of the estimator → reason of the level."""
+"""Verdict of the estimator → reason for the quality level."""
 
 PATH_JUDGED: Final = (
     "The path of a foot does not match its foot-flat periods, so its distances are unreliable."
 )
-"""The same where nothing but the path of a foot is bad."""
+"""Likewise if only the path of a foot is bad."""

@@ -27,9 +27,9 @@ from sagittal.server.storage.files.s3_bucket import S3Bucket
 from sagittal.server.storage.files.trash import Address, Trash, TrashedFile, name_stamp, parse_way
 
 SILENCE_S: Final = 15.0
-"""Longest wait for the next word of the store, and for it to take a piece of a file."""
+"""Timeout for the next response of the store, and for uploading part of a file."""
 BRIEF_S: Final = 5.0
-"""The same for questions under a lock, which are tried again once."""
+"""Likewise for requests under a lock, which are retried once."""
 _BLOBS, _TRASH, _PROBE = "blobs/", "trash/", "probe"
 
 
@@ -72,7 +72,7 @@ class BucketBlobs(BlobStore):
         self._brief.load(_PROBE)
         next(self._brief.list(_BLOBS), None)
         self._brief.delete([_PROBE])
-        # what is received waits here
+        # received files wait here
         with fs.IncomingFile(self.incoming) as file:
             file.write(bytes(4096))
 
@@ -109,7 +109,7 @@ class BucketBlobs(BlobStore):
     def _stored(self) -> Iterator[BlobFile]:
         for entry in self._bucket.list(_BLOBS):
             space, _, name = entry["path"].removeprefix(_BLOBS).partition("/")
-            with contextlib.suppress(ValueError):  # an object of somebody else's is passed over
+            with contextlib.suppress(ValueError):  # foreign objects are skipped
                 check_address(space, name)
                 yield BlobFile(space, name, _age_s(entry["last_modified"]))
 

@@ -27,11 +27,11 @@ from sagittal.server.storage import fs
 from sagittal.server.storage.files.trash import Trash
 
 PIECE: Final = 1 << 20
-"""Bytes of a file that are in memory at once."""
+"""Bytes of a file in memory at a time."""
 _HEX32 = re.compile(r"[0-9a-f]{32}")
 _HEX64 = re.compile(r"[0-9a-f]{64}")
 INCOMING = "incoming"
-"""The space of files that are being received, or were when their process died; always a local folder."""
+"""Space of files being received, or left by a dead process; always a local folder."""
 
 
 class IntegrityError(SagittalError):
@@ -89,7 +89,7 @@ class BlobStore(ABC):
     """
 
     moved_at_once: ClassVar[int]
-    """Files that go to the trash under one write lock: nobody else can write meanwhile."""
+    """Files moved to the trash per write lock, which blocks other writers."""
 
     def __init__(self, incoming: Path, trash: Trash, place: str) -> None:
         self.incoming, self.trash, self.place = incoming, trash, place

@@ -25,18 +25,19 @@ log = logging.getLogger(__name__)
 
 CONNECT_S: Final = 3.0
 WHOLE_S: Final = 3600.0
-"""Longest time for one file."""
+"""Time limit for one file."""
 RETRY_S: Final = 10.0
-"""A request that failed within so long is tried again."""
+"""Time within which a failed request is retried."""
 REST_S, LONGEST_REST_S = 2.0, 15.0
-"""After the store was found away nobody waits for it again for so long, or as long as that took: a list asks
-for many files, and what waits keeps a thread from other pages."""
+"""After the store was unavailable, requests fail immediately for this long, or as long as the failure took: a
+list needs many files, and waiting threads block other pages.
+"""
 PUT_BYTES: Final = 5 << 20
 PUT_AT_ONCE: Final = 2
 DELETE_AT_ONCE: Final = 1000
 _AWAY: Final = re.compile(r"HTTP error|status code: (5\d\d|408|429)|timed out|server error", re.IGNORECASE)
 _NO_KEYS: Final = "/latest/api/token"
-"""Where a cloud's machine is asked for keys when the environment has none."""
+"""Where cloud machines obtain keys if the environment has none."""
 
 
 class S3Bucket:
@@ -145,7 +146,7 @@ class S3Bucket:
             if isinstance(error, OSError) and error.errno is not None:
                 raise  # of a local file
             text = str(error)
-            # the answer to HEAD has no words; another 404 is of no store, or of a bucket that is not there
+            # the response to HEAD has no message; another 404 means a wrong store or a missing bucket
             if isinstance(error, FileNotFoundError) and ("NoSuchKey" in text or "performing HEAD" in text):
                 raise _AbsentError from None
             detail = _shorten(text)

@@ -19,7 +19,7 @@ from typing import BinaryIO, Final
 from sagittal.server.storage import fs
 
 KEPT: Final = dt.timedelta(days=30)
-"""Time in which somebody notices that the wrong database was put back."""
+"""Time for noticing that the wrong database was restored."""
 _STAMP: Final = "%Y%m%dT%H%M%SZ"
 _SPACE: Final = re.compile(r"[0-9a-f]{32}")
 _NAME: Final = re.compile(r"[0-9a-f]{64}")

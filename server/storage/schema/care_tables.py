@@ -7,7 +7,7 @@ from sqlalchemy import CheckConstraint, Column, String, Table
 from sagittal.server.storage.schema.columns import UserLines, Utc, id_column, metadata, owner, reference
 
 clinic_option = Table(
-    "clinic_option",  # what the clinic has switched on; an option without a row is off
+    "clinic_option",  # options enabled by the clinic; an option without a row is off
     metadata,
     Column("name", String(32), primary_key=True),
     Column("since", Utc, nullable=False),
@@ -22,7 +22,7 @@ care_team_member = Table(
 )
 
 emergency_access = Table(
-    "emergency_access",  # of somebody who is not in the team, for a time and with a reason
+    "emergency_access",  # temporary access for a user outside the team, with a reason
     metadata,
     id_column(),
     reference("patient_id", "patient"),
@@ -30,6 +30,6 @@ emergency_access = Table(
     Column("reason", UserLines, nullable=False),
     Column("opened_at", Utc, nullable=False),
     Column("ends_at", Utc, nullable=False),
-    Column("ended_at", Utc),  # before that, by somebody: for good, whatever the clock does
+    Column("ended_at", Utc),  # ended early by a user: permanent, independent of the clock
     CheckConstraint("ends_at > opened_at", name="ends"),
 )

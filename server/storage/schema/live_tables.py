@@ -20,21 +20,21 @@ live_take = Table(
     id_column(),
     reference("session_id", "session"),
     Column("state", String(16), nullable=False),
-    Column("code_sha256", String(64), unique=True),  # of the pairing code; None once it was used
+    Column("code_sha256", String(64), unique=True),  # of the pairing code; None once used
     Column("code_expires_at", Utc),
-    Column("token_sha256", String(64), unique=True),  # of the tablet's token, which opens this take only
+    Column("token_sha256", String(64), unique=True),  # of the tablet's token, valid for this trial only
     Column("token_expires_at", Utc),
     reference("opened_by", "user", nullable=True, index=False),
-    reference("prescription_id", "prescription", nullable=True, index=False),  # the one in force at its start
-    Column("source", String(32)),  # what the tablet said it streams
+    reference("prescription_id", "prescription", nullable=True, index=False),  # in force at its start
+    Column("source", String(32)),  # data source declared by the tablet
     Column("count", Integer),  # batches at the end
-    Column("sha256", String(64)),  # of all payloads, as the tablet said at the end
-    reference("recording_id", "recording", nullable=True, index=False),  # None: not stored, or nothing came
-    Column("problem", String(64)),  # code of what was wrong at the end
+    Column("sha256", String(64)),  # of all payloads, as declared by the tablet at the end
+    reference("recording_id", "recording", nullable=True, index=False),  # None: not stored, or no data
+    Column("problem", String(64)),  # code of a problem at the end
     Column("created_at", Utc, nullable=False),
     Column("finished_at", Utc),
-    Column("node", String(32)),  # the web server that has its log (node_tables.py); None: one without a name
-    Column("node_run", Integer),  # which start of it has it
+    Column("node", String(32)),  # the web server that has its log (node_tables.py); None: an unnamed server
+    Column("node_run", Integer),  # run of that server
     one_of("state", TAKE_STATES),
     CheckConstraint("(state IN ('finished', 'closed')) = (finished_at IS NOT NULL)", name="finished"),
 )
@@ -54,7 +54,7 @@ live_event = Table(
     Column("seq", Integer, primary_key=True, autoincrement=True),
     reference("take_id", "live_take"),
     Column("kind", String(16), nullable=False),
-    Column("t_s", Float),  # on the take's axis; None before its first sample
+    Column("t_s", Float),  # on the trial's time axis; None before its first sample
     Column("content", Json, nullable=False),
     reference("user_id", "user", nullable=True, index=False),  # None: the estimator
     Column("at", Utc, nullable=False),

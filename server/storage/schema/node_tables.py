@@ -10,16 +10,17 @@ web_node = Table(
     "web_node",
     metadata,
     Column("name", UserString(32), primary_key=True),
-    Column("address", UserString(300), nullable=False),  # where the other nodes reach it
-    Column("key_sha256", String(64), nullable=False),  # of the key in the data folder: all of them share that
-    Column("run", Integer, nullable=False),  # which of its starts; an earlier one is fenced off
+    Column("address", UserString(300), nullable=False),  # address for the other nodes
+    Column("key_sha256", String(64), nullable=False),  # of the key in the shared data folder
+    Column("run", Integer, nullable=False),  # number of its start; earlier ones are fenced off
     Column("started_at", Utc, nullable=False),
-    Column("beat_at", Utc),  # None: it was stopped
+    Column("beat_at", Utc),  # None: stopped
     CheckConstraint("run >= 1", name="run"),
 )
 
 failed_attempt = Table(
-    "failed_attempt",  # to get in, of an account, an address or both; kept where several nodes count together
+    # failed sign-ins of an account, an address or both; stored where several nodes count together
+    "failed_attempt",
     metadata,
     id_column(),
     Column("account", Text),

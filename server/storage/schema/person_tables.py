@@ -38,7 +38,7 @@ consent = Table(
     reference("patient_id", "patient"),
     Column("purpose", String(16), nullable=False),
     Column("given_on", Date, nullable=False),
-    Column("evidence", UserString(200), nullable=False),  # where it is written: "signed form, file 12"
+    Column("evidence", UserString(200), nullable=False),  # reference to the document: "signed form, file 12"
     Column("withdrawn_on", Date),
     Column("created_at", Utc, nullable=False),
     reference("created_by", "user", nullable=True, index=False),
@@ -47,7 +47,7 @@ consent = Table(
 )
 
 patient_identity = Table(
-    "patient_identity",  # every value encrypted, bound to patient and field (storage/field_cipher.py)
+    "patient_identity",  # all values encrypted, bound to patient and field (storage/field_cipher.py)
     metadata,
     owner("patient_id", "patient"),
     Column("name", LargeBinary),
@@ -59,7 +59,7 @@ patient_identity = Table(
 )
 
 identity_key = Table(
-    "identity_key",  # which key seals all of patient_identity; no row: none has been used yet
+    "identity_key",  # the key that encrypts patient_identity; no row: none used yet
     metadata,
     Column("purpose", String(16), primary_key=True),
     Column("name", String(16), nullable=False),
@@ -73,7 +73,7 @@ api_token = Table(
     id_column(),
     reference("user_id", "user"),
     Column("name", UserString(40), nullable=False),
-    Column("token_sha256", String(64), nullable=False, unique=True),  # the token itself was shown once
+    Column("token_sha256", String(64), nullable=False, unique=True),  # the token itself was shown only once
     Column("scopes", Json, nullable=False),
     Column("created_at", Utc, nullable=False),
     Column("expires_at", Utc, nullable=False),
@@ -85,10 +85,11 @@ second_factor = Table(
     metadata,
     owner("user_id", "user"),
     Column("secret", LargeBinary, nullable=False),  # encrypted (server/auth/second_factor.py)
-    Column("recovery", Json, nullable=False),  # hashes of the codes that have not been used
-    Column("last_step", Integer, nullable=False),  # of the newest code that was taken: none is taken twice
-    Column("confirmed_at", Utc),  # None: set up, and not yet proved by a code
-    Column("keys_only", Boolean, nullable=False, server_default=false()),  # codes of it are not taken
+    Column("recovery", Json, nullable=False),  # hashes of unused codes
+    # time step of the newest accepted code: none is accepted twice
+    Column("last_step", Integer, nullable=False),
+    Column("confirmed_at", Utc),  # None: not yet confirmed by a code
+    Column("keys_only", Boolean, nullable=False, server_default=false()),  # its codes are not accepted
 )
 
 security_key = Table(
@@ -97,7 +98,7 @@ security_key = Table(
     id_column(),
     reference("user_id", "user"),
     Column("name", UserString(40), nullable=False),
-    Column("host", UserString(255), nullable=False),  # name and port where the key was set up
+    Column("host", UserString(255), nullable=False),  # host name and port where the key was registered
     Column("credential_id", LargeBinary, nullable=False, unique=True),
     Column("public_key", LargeBinary, nullable=False),
     Column("sign_count", Integer().with_variant(BigInteger(), "postgresql"), nullable=False),
@@ -106,7 +107,7 @@ security_key = Table(
 )
 
 security_key_challenge = Table(
-    "security_key_challenge",  # given out and not yet answered
+    "security_key_challenge",  # issued and not yet answered
     metadata,
     Column("challenge_sha256", String(64), primary_key=True),
     reference("user_id", "user"),

@@ -22,7 +22,7 @@ assessment = Table(
     "assessment",
     metadata,
     owner("session_id", "session"),
-    Column("content", UserLines, nullable=False),  # of the therapist, on the report
+    Column("content", UserLines, nullable=False),  # the therapist's assessment on the report
     Column("changed_at", Utc, nullable=False),
 )
 
@@ -32,9 +32,10 @@ signed_report = Table(
     id_column(),
     reference("session_id", "session"),
     Column("number", Integer, nullable=False),  # version of the session's report, from 1
-    Column("analysis_id", String(32), nullable=False),  # what it was made from; no key: it stands by itself
+    # its analysis; not a foreign key, as the report is independent
+    Column("analysis_id", String(32), nullable=False),
     Column("language", String(8), nullable=False),
-    Column("signed_by", UserString(200)),  # the name it bears; no key, as accounts may go
+    Column("signed_by", UserString(200)),  # name at that time; not a foreign key, as accounts may be deleted
     Column("signed_at", Utc, nullable=False),
     Column("reopened_by", UserString(200)),
     Column("reopened_at", Utc),  # None: in force
@@ -56,14 +57,15 @@ report_link = Table(
     metadata,
     id_column(),
     reference("report_id", "signed_report"),
-    Column("token_sha256", String(64), nullable=False, unique=True),  # the token is only in the address
+    Column("token_sha256", String(64), nullable=False, unique=True),  # the token is only in the URL
     Column("made_by", UserString(200)),
-    reference("maker_id", "user", nullable=True, index=False),  # its account; made_by is the name it had
+    reference("maker_id", "user", nullable=True, index=False),  # account; made_by is the name at that time
     Column("made_at", Utc, nullable=False),
     Column("expires_at", Utc, nullable=False),
     Column("revoked_at", Utc),
     Column("openings", Integer, nullable=False),
     Column("opened_at", Utc),  # last
-    reference("emergency_id", "emergency_access", nullable=True),  # in which it was made and ends
+    # in which it was created and with which it ends
+    reference("emergency_id", "emergency_access", nullable=True),
     CheckConstraint("openings >= 0", name="openings"),
 )

@@ -98,7 +98,7 @@ session = Table(
     Column("performed_on", Date, nullable=False),
     Column("protocol", String(32), nullable=False),
     Column("height_m", Float),
-    # how it was walked (core/subject/condition.py); None: nobody stated it
+    # walking condition (core/subject/condition.py); None: not recorded
     Column("pace", String(32)),
     Column("aid", String(32)),
     Column("orthosis", String(32)),
@@ -114,9 +114,9 @@ recording = Table(
     metadata,
     _id(),
     _ref("session_id", "session"),
-    Column("manifest", UserJson),  # the mapping as last confirmed; every analysis keeps its own copy
-    Column("inspection", Json),  # what was found in the files, before any mapping
-    Column("wanted_key", String(300)),  # key of the analysis that was asked for last
+    Column("manifest", UserJson),  # the latest confirmed mapping; every analysis keeps its own copy
+    Column("inspection", Json),  # inspection results, before any mapping
+    Column("wanted_key", String(300)),  # key of the analysis requested last
     Column("created_at", Utc, nullable=False),
 )
 
@@ -124,19 +124,19 @@ recording_file = Table(
     "recording_file",
     metadata,
     _owner("recording_id", "recording"),
-    Column("name", UserString(500), primary_key=True),  # as uploaded, with its folders; any Unicode
+    Column("name", UserString(500), primary_key=True),  # as uploaded, including folders; any Unicode
     *_describe_file(),
     Column("added_at", Utc, nullable=False),
 )
 
 file_upload = Table(
-    "file_upload",  # a file that comes in parts (services/uploads.py)
+    "file_upload",  # a file uploaded in parts (services/uploads.py)
     metadata,
     _id(),
     _ref("session_id", "session"),
     Column("name", UserString(500), nullable=False),
-    Column("size", Integer, nullable=False),  # of the whole file, as announced
-    Column("finished_sha256", String(64)),  # None: it is still coming
+    Column("size", Integer, nullable=False),  # of the complete file, as announced
+    Column("finished_sha256", String(64)),  # None: incomplete
     Column("created_at", Utc, nullable=False),
     CheckConstraint("size >= 1", name="size"),
 )
@@ -148,7 +148,7 @@ user = Table(
     Column("name", UserString(64), nullable=False, unique=True),  # sign-in name, lower case
     Column("display_name", UserString(200), nullable=False),
     Column("role", String(16), nullable=False),
-    Column("password_hash", String(255)),  # None until the set-up link was used
+    Column("password_hash", String(255)),  # None until the set-up link is used
     Column("active", Boolean, nullable=False),
     Column("created_at", Utc, nullable=False),
     Column("language", String(8)),  # of the pages (web/language.py); None: the browser's
@@ -169,7 +169,7 @@ one_time_token = Table(
     "one_time_token",
     metadata,
     Column("token_sha256", String(64), primary_key=True),
-    _ref("user_id", "user", nullable=True),  # None: the first administrator, who does not exist yet
+    _ref("user_id", "user", nullable=True),  # None: the first administrator, not yet created
     Column("purpose", String(16), nullable=False),
     Column("expires_at", Utc, nullable=False),
     Column("used_at", Utc),
@@ -181,9 +181,7 @@ job = Table(
     metadata,
     Column("seq", Integer, primary_key=True, autoincrement=True),  # order of submission
     Column("id", String(32), nullable=False, unique=True),
-    Column(
-        "key", String(300), nullable=False
-    ),  # what is computed; at most one live or successful job per key
+    Column("key", String(300), nullable=False),  # computation; at most one pending or successful job per key
     Column("kind", String(32), nullable=False),
     _ref("recording_id", "recording", nullable=True),
     _ref("requested_by", "user", nullable=True),
@@ -191,15 +189,15 @@ job = Table(
     Column("priority", Integer, nullable=False),  # smaller first
     Column("state", String(16), nullable=False),
     Column("attempt", Integer, nullable=False),  # number of claims: the fence
-    Column("deaths", Integer, nullable=False),  # claims that ended without a word
-    Column("released", Integer, nullable=False, server_default="0"),  # claims given back unharmed
+    Column("deaths", Integer, nullable=False),  # claims that ended in a crash
+    Column("released", Integer, nullable=False, server_default="0"),  # claims that were released
     Column("worker", String(100)),
     Column("lease_until", Utc),
     Column("cancel_requested", Boolean, nullable=False),
     Column("stage", String(64)),
     Column("fraction", Float),
     Column("message", String(500)),
-    Column("checkpoint", String(64)),  # sha256 of what the next attempt goes on from
+    Column("checkpoint", String(64)),  # sha256 of the checkpoint for the next attempt
     Column("error_code", String(64)),
     Column("error_message", Text),
     Column("created_at", Utc, nullable=False),
@@ -230,7 +228,7 @@ analysis = Table(
     Column("manifest", UserJson),
     Column("config", Json, nullable=False),
     Column("created_at", Utc, nullable=False),
-    UniqueConstraint("job_id"),  # one job, one visible result
+    UniqueConstraint("job_id"),  # one visible result per job
 )
 
 analysis_file = Table(
@@ -245,9 +243,9 @@ device_check = Table(
     "device_check",
     metadata,
     _owner("recording_id", "recording"),
-    Column("device_id", UserString(32), primary_key=True, index=True),  # a serial number, never a file's name
-    Column("segment", String(16), nullable=False),  # where the analysis took it to be
-    Column("exchanged", Boolean, nullable=False),  # its place was said wrongly: it is not offered again
+    Column("device_id", UserString(32), primary_key=True, index=True),  # a serial number, never a file name
+    Column("segment", String(16), nullable=False),  # segment assigned by the analysis
+    Column("exchanged", Boolean, nullable=False),  # its placement was declared wrongly: not suggested again
     Column("content", Json, nullable=False),  # sagittal.core.quality.devices.DeviceCheck
     Column("at", Utc, nullable=False),
 )
@@ -268,8 +266,9 @@ session_video = Table(
     Column("name", UserString(500), nullable=False),
     Column("media_type", String(32), nullable=False),
     *_describe_file(),
-    Column("offset_s", Float),  # time in the video at the take's time 0; None: nobody has aligned it
-    Column("consent_by", UserString(64)),  # who said that the person agreed; no key, as accounts may go
+    Column("offset_s", Float),  # video time at trial time 0; None: not aligned
+    # user who confirmed consent; not a foreign key, as accounts may be deleted
+    Column("consent_by", UserString(64)),
     Column("consent_at", Utc, nullable=False),
 )
 
@@ -301,11 +300,11 @@ edit = Table(
     Column("seq", Integer, primary_key=True, autoincrement=True),
     _ref("analysis_id", "analysis"),
     Column("kind", String(16), nullable=False),
-    Column("content", Json, nullable=False),  # sagittal.core.events.edits.Edit; of an undo {}
+    Column("content", Json, nullable=False),  # sagittal.core.events.edits.Edit; {} for an undo
     _ref("user_id", "user", nullable=True, index=False),
     Column("at", Utc, nullable=False),
     _one_of("kind", EDIT_KINDS),
-    sqlite_autoincrement=True,  # a number is never given twice: it says which state of a review was seen
+    sqlite_autoincrement=True,  # numbers are never reused: they identify the state of a review
 )
 
 tuning = Table(
@@ -318,7 +317,7 @@ tuning = Table(
     Column("code_version", String(64), nullable=False),
     Column("result", Json, nullable=False),  # sagittal.core.fusion.algorithms.tuning.TuningResult
     Column("created_at", Utc, nullable=False),
-    UniqueConstraint("job_id"),  # one job, one visible result
+    UniqueConstraint("job_id"),  # one visible result per job
 )
 
 programme = Table(
@@ -341,7 +340,7 @@ planned_visit = Table(
     Column("kind", String(16), nullable=False),
     Column("week", Integer, nullable=False),  # of the programme, 1 = that of the first training
     Column("planned_on", Date, nullable=False),
-    _ref("session_id", "session", nullable=True, index=False),  # the visit that took place
+    _ref("session_id", "session", nullable=True, index=False),  # the linked session
     _one_of("kind", VISIT_KINDS),
     UniqueConstraint("session_id"),
     UniqueConstraint("programme_id", "position"),
@@ -363,7 +362,7 @@ audit = Table(
     metadata,
     Column("seq", Integer, primary_key=True, autoincrement=True),
     Column("at", Utc, nullable=False),
-    Column("user_id", String(32)),  # no foreign key: the trail outlives everything it speaks of
+    Column("user_id", String(32)),  # not a foreign key: the trail outlives the resources it refers to
     Column("user_name", UserString(64)),
     Column("action", String(64), nullable=False),
     Column("resource", String(32), nullable=False),

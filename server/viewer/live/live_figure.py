@@ -21,7 +21,7 @@ from sagittal.server.viewer.room import SceneRoom, frame_person
 from sagittal.server.viewer.viser_adapter import show_at_once
 
 _BURIED: Final = np.array([0.0, 0.0, -100.0])
-"""Where a ghost is that has no phase."""
+"""Position of a ghost without a phase."""
 
 
 class LiveFigure:
@@ -105,10 +105,10 @@ class LiveFigure:
         q, p = moment.q[np.newaxis], moment.p[np.newaxis]
         rows = None if self._reference is None else _find_rows(segments)
         if rows is not None and self._reference is not None:
-            # the ghost is one frame more of the same layout
+            # the ghost is an additional frame of the same layout
             q, p = np.concatenate((q, q)), np.concatenate((p, p))
             ghost_pose = self._reference.at(moment.phase, (x, y), heading)
-            # a trunk that only the person has hangs on the ghost's pelvis as on the person's
+            # a trunk without a pose of its own follows the ghost's pelvis
             p[1] = _BURIED if ghost_pose is None else ghost_pose[1][0]
             if ghost_pose is not None:
                 q[1, rows], p[1, rows] = ghost_pose
@@ -140,8 +140,8 @@ class LiveFigure:
         for part in (*self._drawn.parts.values(), *self._ghost.parts.values()):
             part.handle.remove()
         self._layout, self._key = layout, key
-        # a new name each time: under the old one the client keeps its shader, which does not fit copies that
-        # have opacities now (GL_INVALID_OPERATION, and nothing is drawn)
+        # a new name each time: under the old one the client keeps its shader, which does not support the
+        # opacities of the new instances (GL_INVALID_OPERATION, and nothing is drawn)
         self._times += 1
         scene, suffix, batches = self._server.scene, f"_{self._times}", layout.divide(placed)
         self._drawn = DrawnFigure(draw_figure(scene, batches, suffix), layout.copies)

@@ -21,15 +21,15 @@ from sagittal.server.viewer.steps import CLEAR_M, PIECE_M, REST_MPS, SAME_M, Sin
 from sagittal.server.viewer.viser_adapter import draw_lines, move_copies
 
 TRAIL_S: Final = 6.0
-"""Seconds of way that are shown."""
+"""Displayed duration of trails, s."""
 PIECES: Final = 192
-"""Pieces of a trail at most: 6 s at 1.6 m/s; of who is faster the oldest go sooner."""
+"""Maximum segments of a trail: 6 s at 1.6 m/s; at higher speeds the oldest disappear sooner."""
 PRINTS: Final = 8
-"""Footprints per side: about the same seconds."""
+"""Footprints per side: about the same duration."""
 EVERY_S: Final = 0.1
-"""Trails are sent no more often."""
+"""Minimum interval of sending trails."""
 REST_S: Final = 0.1
-"""The foot's speed is taken over this."""
+"""Window for the speed of the foot."""
 
 _GONE: Final = np.array([0.0, 0.0, -100.0], np.float32)
 _PIXELS, _OPACITY = 1.6, 0.6
@@ -86,7 +86,8 @@ class LiveFloor:
         """Change the colours to the theme of the embedding page."""
         for side in SIDES:
             self._steps[side].node.batched_colors = np.array(to_linear_rgb(TINTS[dark][side]), np.uint8)
-        # as those of copies: viser takes one colour of all lines as sRGB, many as linear
+        # like those of instances: viser interprets one colour for all lines as sRGB, individual ones as
+        # linear
         rows = [np.full((PIECES, 2, 3), to_linear_rgb(TINTS[dark][side]), np.uint8) for side in SIDES]
         self._line.colors = np.concatenate(rows)
 
@@ -186,7 +187,7 @@ class _Steps:
         if self._shown is not None:
             self._put(self._shown)
         elif np.isfinite(self._slowest):
-            self._print()  # it never rested: its slowest moment is all there is
+            self._print()  # it never rested: use the moment of lowest speed
         self._shown, self._slowest = None, np.inf
 
     def _put(self, k: int) -> None:

@@ -9,11 +9,12 @@ from typing import Final
 from sagittal.server.viewer.motion import ROOT_WINDOW_S
 
 GAP_S: Final = 1.0
-"""After such a gap, or a step back in time, what was before says nothing about now."""
+"""After such a gap, or a step back in time, earlier samples are discarded."""
 
 NEAR_M: Final = 0.3
-"""The smoothed place is never farther from the person: sway and push of a stride stay well below it; in a
-turn back the correction points the wrong way and would bring the person into the camera."""
+"""Maximum distance of the smoothed position from the person: sway and push-off remain well below it; in a
+U-turn the correction points the wrong way and would move the person into the camera.
+"""
 
 Sample = tuple[float, float, float, float]
 """Time in s, place in m, heading in rad."""
@@ -34,7 +35,7 @@ class LivePath:
         """Add a position in m and a heading in rad and return both smoothed."""
         if self._late.samples and not 0.0 <= t_s - self._late.samples[-1][0] <= GAP_S:
             self._clear()
-        # unwrapped, so that a turn through ±π is a turn like any other
+        # unwrapped, so that turning through ±π is continuous
         self._heading += (heading - self._heading + pi) % (2 * pi) - pi
         self._late.add((t_s, x, y, self._heading))
         while self._late.samples[0][0] <= t_s - ROOT_WINDOW_S:
@@ -43,7 +44,7 @@ class LivePath:
             self._early.drop()
         now, *position = self._late.mean()
         if self._early.samples and self._early.samples[0][0] <= t_s - 1.5 * ROOT_WINDOW_S:
-            # both windows by what is in them: the older one may not be full yet
+            # both windows by their content: the older one may not be full yet
             earlier, *was = self._early.mean()
             share = (t_s - now) / (now - earlier)
             position = [a + (a - b) * share for a, b in zip(position, was, strict=True)]
@@ -68,7 +69,7 @@ class _Window:
 
     def drop(self) -> Sample:
         sample = self.samples.popleft()
-        # an empty window begins anew, so that rounding does not grow for ever
+        # restart an empty window, so that rounding errors do not accumulate
         self._sums = [a - b for a, b in zip(self._sums, sample, strict=True)] if self.samples else [0.0] * 4
         return sample
 

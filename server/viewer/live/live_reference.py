@@ -16,14 +16,14 @@ from sagittal.server.viewer.live.moment import FigureMoment
 from sagittal.server.viewer.reference import SAGITTAL, ReferenceWalk, add_standing_angles, find_better_side
 
 MEAN_OF: Final = 5
-"""Strides of a side whose mean is shown: enough to be the person's walk, few enough to be the present one."""
+"""Strides averaged per side: enough for a typical cycle, few enough to be current."""
 SPEED_OF, SPEED_FROM = 10, 3
-"""Strides whose mean speed chooses the norm, and how many it takes: as on the page."""
+"""Strides whose mean speed selects the norm, and minimum number required: as on the page."""
 SPEED_STEP_MPS: Final = 0.05
-"""The norm changes in such steps, so that the figure does not waver with every stride."""
+"""Speed steps of the norm, so that it does not change with every stride."""
 
 NormAt = Callable[[float | None], Mapping[str, Floats]]
-"""Walking speed in m/s, None = not known yet → norm curves in rad; empty where none fits."""
+"""Gait speed in m/s, None = unknown → norm curves in rad; empty if none applies."""
 
 
 class FeedStride(msgspec.Struct, frozen=True):

@@ -111,7 +111,7 @@ class ReplayFigure:
             part.handle.remove()
         self._matched, self._ghost = overlay, {}
         if overlay is not None:
-            # each has names of its own: under a name in use the client may keep an older shader
+            # each has a separate name: under a reused name the client may keep an older shader
             x, y = self._middle.tolist()
             self._ghost = draw_ghost(self._server.scene, overlay.batches, f"_{name}", (x, y))
             for part in self._ghost.values():
@@ -133,7 +133,7 @@ def _whole(motion: ReplayMotion) -> CameraShot:
     half = np.append(np.ptp(motion.root, axis=0) / 2, motion.size) + 0.2
     corners = half * np.stack(np.meshgrid(*[(-1, 1)] * 3), axis=-1).reshape(-1, 3)
     horizontal, up, ahead = (corners @ np.stack((right, np.cross(right, sight), sight)).T).T
-    # how far back the eye must be for a corner to be inside a square picture of this angle
+    # distance at which a corner is inside a square picture with this field of view
     back = np.maximum(abs(horizontal), abs(up)) / np.tan(FOV_RAD / 2) - ahead
     target = np.array([0.0, 0.0, motion.size])
     x, y, z = target - back.max() * sight

@@ -17,10 +17,10 @@ from sagittal.server.viewer.motion import ReplayMotion
 from sagittal.server.viewer.steps import FootPrints, FootTrail, Single
 
 CHUNK = 256
-"""Pieces of a trail per scene node, about eight strides."""
+"""Segments of a trail per scene node, about eight strides."""
 
 RECENT_PRINTS = 12
-"""Footprints per side shown close to the walker; of a trail the last whole chunk and the unfinished one."""
+"""Footprints per side in close-up; of a trail the last complete chunk and the incomplete one."""
 
 _PIXELS = 1.6
 _OPACITY = 0.6
