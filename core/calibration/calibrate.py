@@ -17,6 +17,7 @@ from sagittal.core.calibration.anterior import (
 from sagittal.core.calibration.forward import ForwardParams
 from sagittal.core.calibration.from_walking import calibrate_from_walking
 from sagittal.core.calibration.functional import (
+    FUNCTIONAL,
     FunctionalMovements,
     FunctionalParams,
     find_functional_axes,
@@ -41,6 +42,7 @@ from sagittal.core.calibration.walking import (
     TRUNK,
     WalkingParams,
     mean_turn,
+    moves_slowly,
     moving_mask,
     straight_parts,
     turn_sensors,
@@ -63,6 +65,14 @@ FACING = radians(20.0)
 
 FEW_STEPS = 8
 """Steps below which calibration says how few there were (docs/science/calibration.md, "Parameters")."""
+
+SEEN_WAYS = ("strides", "velocity", *FUNCTIONAL)
+"""Sources of a forward axis that a movement which leads nowhere does not have."""
+
+NO_WAY = (
+    "No walking detected: the legs move slowly, and no sensor shows progression. Record at least 8 steps "
+    "straight ahead between two periods of standing."
+)
 
 NO_STANDING = (
     "No quiet standing detected: the person only paused mid-stride. Ask them to stand still for 3 to 5 s "
@@ -186,6 +196,11 @@ def _calibrate_at(
             failed.append(error)
     axes |= find_functional_axes(recording, movements, standing, q, params.functional, params.forward)
     failed = [error for error in failed if error.sensor not in axes]
+    if moves_slowly(recording, params.walking) and not any(
+        f.facts.get("source") in SEEN_WAYS for f in axes.values()
+    ):
+        failed = [CalibrationError("no_walking", NO_WAY)] if axes else failed
+        axes = {}
     if not axes and failed:
         raise failed[0]
     orientations = {s: q[s] for s in axes}

@@ -44,6 +44,11 @@ FORWARD: Final[Mapping[FunctionalMethod, float]] = {"hip_swing": 1.0, "trunk_bow
 EDGE_S: Final = 0.75
 """Half the time over which the rates of a swing are averaged."""
 
+STEP_S: Final = 0.2
+IN_TURN: Final = 1.5
+"""Rates are averaged over the first; the other leg steps where it moves so many times as much while this one
+rests as while it moves (our choice)."""
+
 UP: Final = np.array([0.0, 0.0, 1.0])
 
 
@@ -114,7 +119,10 @@ def find_functional_movements(recording: UniformRecording, params: FunctionalPar
     for side, opposite in ((SIDES[0], SIDES[1]), (SIDES[1], SIDES[0])):
         mine, theirs = pace[side], pace[opposite]
         single = (theirs < params.still_rate) & (theirs < params.still_share * mine)
-        swings[side] = _join(single & (mine > params.swing_rate), rate, params)
+        joined = _join(single & (mine > params.swing_rate), rate, params)
+        swings[side] = _drop_steps(
+            joined, _pace(recording, legs[side]), _pace(recording, legs[opposite]), rate
+        )
     trunk = [s for s in TRUNK if s in signals]
     low = {side: [s for s in legs[side] if s != THIGH[side]] for side in SIDES}
     if not trunk or not all(low.values()):
@@ -235,9 +243,30 @@ def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: 
     """Mean |ω| (n,) of some sensors over a window around each sample, rad/s."""
     from scipy.ndimage import uniform_filter1d
 
-    rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in segments], axis=0)
+    rate = _pace(recording, segments)
     width = max(1, min(round(seconds * recording.rate_hz), len(rate)))
     return np.asarray(uniform_filter1d(rate, width, mode="nearest"))
+
+
+def _pace(recording: UniformRecording, segments: Sequence[Segment]) -> Floats:
+    """Mean |ω| (n,) of some sensors, rad/s."""
+    return np.asarray(np.mean([find_lengths(recording.sensors[s].gyr) for s in segments], axis=0))
+
+
+def _drop_steps(mask: Bools, mine: Floats, theirs: Floats, rate_hz: float) -> Bools:
+    """The runs (n,) in which the other leg does not step: one that hardly moves does so in alternation.
+
+    In leg swings the other leg stands all the time; in walking it moves while this one rests.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    width = max(1, round(STEP_S * rate_hz))
+    kept = mask.copy()
+    for a, b in find_runs(mask):
+        own, other = (uniform_filter1d(x[a:b], width, mode="nearest") for x in (mine, theirs))
+        rests = own < np.median(own)
+        kept[a:b] = other[rests].mean() <= IN_TURN * other[~rests].mean()
+    return kept
 
 
 def _widen(mask: Bools, rate_hz: float) -> Bools:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import radians
+from typing import Final
 
 import numpy as np
 
@@ -23,6 +24,9 @@ DOWN: tuple[tuple[Segment, ...], ...] = (
 )
 """Sensors that show a turn, the steadiest first."""
 
+OWN_PERCENTILE: Final = 90.0
+"""Of the pace of a person's legs wherever they move: how they walk, not how they shift their weight."""
+
 
 @dataclass(frozen=True)
 class WalkingParams:
@@ -30,9 +34,11 @@ class WalkingParams:
 
     Parameters
     ----------
-    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. trunk_std : std |f| of a trunk
-        sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has at least 1.9 rad/s and 0.73
-        m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and 0.07).
+    leg_rate : mean |ω| of the leg sensors over 1 s while walking, rad/s. own_share, least_leg_rate, pause_s :
+        a slower person walks above this fraction of their own pace, at least at the second, and pauses up to
+        the third are part of the walk (docs/science/calibration.md, "Straight walking"). trunk_std : std |f|
+        of a trunk sensor over 1 s, m/s² (both our choice: straight walking on neura_walk has at least 1.9
+        rad/s and 0.73 m/s², the simulator's slow walk 1.3 and 2.2, standing at most 0.04 and 0.07).
     shortest_s : shortest straight part used.
     turn_rate, turn_margin_s, turn_cutoff_hz : low-passed yaw rate of a turn
         (docs/science/calibration.md, "Parameters"). Without a trunk sensor the cut-off is halved, because
@@ -40,6 +46,9 @@ class WalkingParams:
     """
 
     leg_rate: float = 0.5
+    own_share: float = 0.5
+    least_leg_rate: float = 0.1
+    pause_s: float = 1.5
     trunk_std: float = 0.35
     shortest_s: float = 1.5
     turn_rate: float = radians(35.0)
@@ -50,13 +59,45 @@ class WalkingParams:
 def moving_mask(recording: UniformRecording, params: WalkingParams) -> Bools:
     """Samples (n,) of walking-like movement: from the leg sensors, or the trunk without them."""
     legs = [s for s in recording.sensors if s not in TRUNK]
-    width = max(1, round(recording.rate_hz))
-    if legs:
-        rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in legs], axis=0)
-        return np.asarray(_box(rate, width) > params.leg_rate)
-    norm = np.mean([find_lengths(s.acc) for s in recording.sensors.values()], axis=0)
-    norm = norm - norm.mean()
-    return np.asarray(_box(norm**2, width) - _box(norm, width) ** 2 > params.trunk_std**2)
+    if not legs:
+        width = max(1, round(recording.rate_hz))
+        norm = np.mean([find_lengths(s.acc) for s in recording.sensors.values()], axis=0)
+        norm = norm - norm.mean()
+        return np.asarray(_box(norm**2, width) - _box(norm, width) ** 2 > params.trunk_std**2)
+    pace = _measure_pace(recording)
+    limit = _find_limit(pace, params)
+    walking = pace > limit
+    if limit < params.leg_rate:
+        # who walks so slowly waits between two steps
+        for a, b in find_runs(~walking):
+            if a > 0 and b < len(pace) and b - a <= params.pause_s * recording.rate_hz:
+                walking[a:b] = True
+    return np.asarray(walking)
+
+
+def moves_slowly(recording: UniformRecording, params: WalkingParams) -> bool:
+    """Whether the legs walk, if they do, more slowly than is sure to be walking most of the time."""
+    if all(s in TRUNK for s in recording.sensors):
+        return False
+    pace = _measure_pace(recording)
+    moves = pace > _find_limit(pace, params)
+    return bool(moves.any()) and 2 * int((pace > params.leg_rate).sum()) < int(moves.sum())
+
+
+def _measure_pace(recording: UniformRecording) -> Floats:
+    """Mean |ω| (n,) of the leg sensors over a second, rad/s."""
+    legs = [s for s in recording.sensors if s not in TRUNK]
+    rate = np.mean([find_lengths(recording.sensors[s].gyr) for s in legs], axis=0)
+    return _box(np.asarray(rate), max(1, round(recording.rate_hz)))
+
+
+def _find_limit(pace: Floats, params: WalkingParams) -> float:
+    """From what pace on legs of this pace (n,), rad/s, walk: by one limit, or by the person's own."""
+    moves = pace[pace > params.least_leg_rate]
+    if not len(moves):
+        return params.leg_rate
+    own = params.own_share * float(np.percentile(moves, OWN_PERCENTILE))
+    return min(params.leg_rate, max(own, params.least_leg_rate))
 
 
 def turning_mask(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from sagittal.core.errors import Notice, SignalError
+from sagittal.core.events.choice import believes_way
 from sagittal.core.events.foot_contact import (
     ContactReports,
     FootContactParams,
@@ -23,6 +24,7 @@ from sagittal.core.events.foot_contact import (
 )
 from sagittal.core.events.foot_movement import FootMovement, FootMovements
 from sagittal.core.events.foot_pitch import FootPitchParams, FootPitchState, advance_foot_pitch, pitch_signal
+from sagittal.core.events.foot_way import FootWayParams, FootWayState, advance_foot_ways
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Segment, Side
 from sagittal.core.message import Message
@@ -59,6 +61,7 @@ def detect_contacts(
     pitch: FootPitchParams | None = None,
     params: FootContactParams | None = None,
     motions: Mapping[Segment, FootMovement | FootMovements] | None = None,
+    ways: FootWayParams | None = None,
 ) -> GaitEvents:
     """Contacts of each foot with a sensor, at the moment of contact, with their uncertainty.
 
@@ -66,6 +69,7 @@ def detect_contacts(
     ----------
     orientations : with "foot_l", "foot_r" or both; a missing foot gives the notice `foot_missing`.
     motions : movement of each foot; without it swings are detected, and contacts refined, from pitch alone.
+    ways : of swings detected from displacement, used for a foot that pitch misreads.
 
     Returns
     -------
@@ -77,7 +81,7 @@ def detect_contacts(
     """
     rule = pitch or FootPitchParams()
 
-    def find(side: Side) -> list[GaitEvent]:
+    def find(side: Side) -> tuple[list[GaitEvent], bool]:
         state = FootContactState.start(orientations.rate_hz, rule, params)
         motion = (motions or {}).get(FOOT[side])
         q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
@@ -88,9 +92,34 @@ def detect_contacts(
             told = advance_foot_contacts(state, q[part], valid[part], *signals)
             for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
                 pass
-        return list(latest.values())
+        by_pitch = list(latest.values())
+        if motion is None:
+            return by_pitch, False
+        by_way = find_by_way(orientations, side, motion, ways)
+        swings = [(off.time_s, on.time_s) for off, on in zip(by_way[::2], by_way[1::2], strict=True)]
+        landed = [e.time_s for e in by_pitch if e.kind == "ic"]
+        return (by_way, True) if believes_way(swings, landed) else (by_pitch, False)
 
     return _each_foot(orientations, rule, find)
+
+
+def find_by_way(
+    orientations: Orientations,
+    side: Side,
+    motion: FootMovement | FootMovements,
+    params: FootWayParams | None = None,
+) -> list[GaitEvent]:
+    """Contacts of one foot by the way it moves, at the person's own level of rest over the whole take."""
+    state = FootWayState.start(orientations.rate_hz, params)
+    q, valid = orientations.q[FOOT[side]], orientations.valid[FOOT[side]]
+    for part in cut_blocks(len(q)):
+        state.learn(q[part], valid[part])
+    latest: dict[int, GaitEvent] = {}
+    for part in cut_blocks(len(q)):
+        told = advance_foot_ways(state, q[part], valid[part], motion.cut(part).acc)
+        for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
+            pass
+    return list(latest.values())
 
 
 def read_reports(
@@ -122,17 +151,24 @@ def detect(orientations: Orientations, params: FootPitchParams | None = None) ->
     """Contacts of each foot by the published foot-pitch rule; otherwise as `detect_contacts`."""
     rule = params or FootPitchParams()
 
-    def find(side: Side) -> list[GaitEvent]:
+    def find(side: Side) -> tuple[list[GaitEvent], bool]:
         s, valid = pitch_signal(orientations.q[FOOT[side]]), orientations.valid[FOOT[side]]
-        return _pitch_events(side, s, valid, orientations, rule)
+        return _pitch_events(side, s, valid, orientations, rule), False
 
     return _each_foot(orientations, rule, find)
 
 
 def _each_foot(
-    orientations: Orientations, params: FootPitchParams, find: Callable[[Side], list[GaitEvent]]
+    orientations: Orientations,
+    params: FootPitchParams,
+    find: Callable[[Side], tuple[list[GaitEvent], bool]],
 ) -> GaitEvents:
-    """Apply `find` to every usable foot, and collect notices."""
+    """Apply `find` to every usable foot, and collect notices.
+
+    Parameters
+    ----------
+    find : side → its contacts, and whether they come from displacement.
+    """
     if orientations.rate_hz < params.min_rate_hz:
         raise SignalError(
             "sample_rate_too_low",
@@ -160,7 +196,7 @@ def _each_foot(
             notices.extend(n for n in no_rest if n not in notices)
             continue
         s, valid = pitch_signal(orientations.q[foot]), orientations.valid[foot]
-        found = find(side)
+        found, by_way = find(side)
         events.extend(found)
         figures[foot] = PitchFigures(
             s_min=float(s[valid].min(initial=1.0)),
@@ -170,7 +206,7 @@ def _each_foot(
             n_ic=sum(e.kind == "ic" for e in found),
             n_tc=sum(e.kind == "tc" for e in found),
         )
-        notices.extend(_remarks(side, figures[foot], params))
+        notices.extend(_remarks(side, figures[foot], params, by_way=by_way))
     if params.threshold != FootPitchParams.threshold and figures:
         notices.append(_threshold_notice(figures, params))
     events.sort(key=lambda e: (e.time_s, e.side, e.kind))
@@ -230,11 +266,25 @@ def _flat_level(events: list[GaitEvent], s: Floats, valid: Bools, orientations: 
     return float(np.median(middles)) if middles else None
 
 
-def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams) -> list[Notice]:
+def _remarks(side: Side, figures: PitchFigures, params: FootPitchParams, *, by_way: bool) -> list[Notice]:
     """Notices on why the events of one foot are missing or doubtful."""
     foot = FOOT[side]
     remarks = []
-    if figures.s_min >= params.threshold:
+    if by_way:
+        remarks.append(
+            Notice(
+                "contacts_by_way",
+                Message(
+                    "The pitch of the {side} foot does not show its contacts, as in shuffling or dragging. "
+                    "They were detected from its displacement: {n_ic} initial contacts, to about ± 0.05 s.",
+                    side=side,
+                    n_ic=figures.n_ic,
+                ),
+                foot,
+                severity="info",
+            )
+        )
+    elif figures.s_min >= params.threshold:
         remarks.append(
             Notice(
                 "no_toe_off",

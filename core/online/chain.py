@@ -29,6 +29,7 @@ from sagittal.core.events.flags import StrideParams
 from sagittal.core.events.foot_contact import FootContactParams
 from sagittal.core.events.foot_movement import FootMovement
 from sagittal.core.events.foot_pitch import FootPitchParams
+from sagittal.core.events.foot_way import FootWayParams
 from sagittal.core.events.live_contacts import ContactDetector
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import Bools, Floats, Segment, Side
@@ -65,6 +66,7 @@ class ChainParams:
     attitude: AttitudeParams = field(default_factory=AttitudeParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
     contacts: FootContactParams = field(default_factory=FootContactParams)
+    ways: FootWayParams = field(default_factory=FootWayParams)
     strides: StrideParams = field(default_factory=StrideParams)
 
 
@@ -120,7 +122,9 @@ class LiveChain:
             index, [mounted[s] for s in turned], rate, self.params.attitude, len(feet)
         )
         self._still = StillnessDetector(len(feet), rate)
-        self._contacts = ContactDetector(feet, rate, self.params.events, self.params.contacts)
+        self._contacts = ContactDetector(
+            feet, rate, self.params.events, self.params.contacts, self.params.ways
+        )
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         self._foot_mounts = [mounted[f] for f in feet]
         self._courses = tuple(s for s in COURSES if s in self.segments)

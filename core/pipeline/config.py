@@ -14,7 +14,7 @@ from sagittal.core.agreement import AgreementParams
 from sagittal.core.body.pose_params import PoseParams
 from sagittal.core.calibration import CalibrationParams
 from sagittal.core.errors import ParameterError
-from sagittal.core.events import FootContactParams, FootPitchParams, StrideParams
+from sagittal.core.events import FootContactParams, FootPitchParams, FootWayParams, StrideParams
 from sagittal.core.events.alternation import AlternationParams
 from sagittal.core.events.bouts import BoutParams
 from sagittal.core.events.consensus import ConsensusParams
@@ -72,7 +72,8 @@ class PipelineConfig:
 
     Parameters
     ----------
-    events : of the foot-pitch rule, which detects contacts. contacts : of their refinement.
+    events : of the foot-pitch rule, which detects contacts. contacts : of their refinement. ways :
+        of swings detected from displacement.
     detector : "foot_contact" has the smallest error (validation/accuracy/test_events_references.py);
         "foot_pitch" is the published rule, for comparison; the consensus also uses the shanks and is led by
         "foot_contact".
@@ -92,6 +93,7 @@ class PipelineConfig:
     fusion: MahonyParams = field(default_factory=MahonyParams)
     events: FootPitchParams = field(default_factory=FootPitchParams)
     contacts: FootContactParams = field(default_factory=FootContactParams)
+    ways: FootWayParams = field(default_factory=FootWayParams)
     detector: Detector = "foot_contact"
     consensus: ConsensusParams = field(default_factory=ConsensusParams)
     alternation: AlternationParams = field(default_factory=AlternationParams)

@@ -299,7 +299,7 @@ def _contacts(
     refined = None
     if config.detector != "foot_pitch":
         motions = measure_foot_movements(calibrated)
-        refined = detect_foot_contacts(orientations, config.events, config.contacts, motions)
+        refined = detect_foot_contacts(orientations, config.events, config.contacts, motions, config.ways)
     detected = all_detectors(orientations, config.events, config.consensus, refined)
     feet = any(s in orientations.q for s in FOOT.values())
     agree = rate_confidence if feet and config.detector != "consensus" else agree_on_contacts
@@ -364,7 +364,7 @@ EVENTS: Final = PipelineStage(
     0.14,
     detect_contacts,
     ("contacts",),
-    ("events", "contacts", "detector", "consensus", "alternation", "lumbar", "turns"),
+    ("events", "contacts", "ways", "detector", "consensus", "alternation", "lumbar", "turns"),
     runs_after_problem=True,
 )
 TRUNK_EVENTS: Final = PipelineStage("events", 0.14, detect_trunk_steps, ("contacts",), ("lumbar", "turns"))

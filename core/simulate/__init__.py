@@ -16,8 +16,8 @@ from sagittal.core.simulate.movements import MOVEMENTS, Movement, simulate_movem
 from sagittal.core.simulate.mt_text import mt_files, mt_text
 from sagittal.core.simulate.patients import PATIENTS, SimulatedPatient
 from sagittal.core.simulate.phases import Phase, phase_table
-from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight
-from sagittal.core.simulate.scripts import SCRIPTS, Scenario, simulate_scenario
+from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, Tremble
+from sagittal.core.simulate.scripts import IMPAIRED_WALKS, SCRIPTS, Scenario, simulate_scenario
 from sagittal.core.simulate.setup import Dropout, Lag, RecordingSetup
 from sagittal.core.simulate.simulation import Simulation, simulate
 from sagittal.core.simulate.squat import Squats, SquatSimulation, SquatTruth, simulate_squats
@@ -28,6 +28,7 @@ from sagittal.core.simulate.tug import ChairSimulation, ChairTruth, simulate_cha
 from sagittal.core.simulate.walker import STEADY, SideGait, Variability, Walker
 
 __all__ = [
+    "IMPAIRED_WALKS",
     "MOVEMENTS",
     "PATIENTS",
     "SCRIPTS",
@@ -64,6 +65,7 @@ __all__ = [
     "SwaySimulation",
     "SwayTruth",
     "SwingsAndBows",
+    "Tremble",
     "Variability",
     "WalkTruth",
     "Walker",

@@ -8,12 +8,13 @@ step has its own random deviations, so the footprints are the exact truth (docs/
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import cos, inf, sin, sqrt
+from math import cos, inf, radians, sin, sqrt
 
 import numpy as np
 
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import SIDES, Side
+from sagittal.core.simulate.gait.tremor import Tremor
 from sagittal.core.simulate.walker import SIGN, Walker
 
 CLOSING = 0.4
@@ -37,6 +38,14 @@ class Stand:
     """Quiet standing."""
 
     duration_s: float
+
+
+@dataclass(frozen=True)
+class Tremble(Stand):
+    """Stand on the spot with trembling legs, as in a freeze: `size_rad` of the foot at `hz`."""
+
+    hz: float = 6.0
+    size_rad: float = radians(3.0)
 
 
 @dataclass(frozen=True)
@@ -149,13 +158,14 @@ class Plan:
     Parameters
     ----------
     steps : all steps in chronological order. footprints : side → its initial footprint, then its steps.
-        stands : (start, end) of each standing period in s.
+        stands : (start, end) of each standing period in s. tremors : trembling of the legs.
     """
 
     steps: tuple[Footprint, ...]
     footprints: dict[Side, tuple[Footprint, ...]]
     stands: tuple[tuple[float, float], ...]
     duration_s: float
+    tremors: tuple[Tremor, ...] = ()
 
     @property
     def typical_step_s(self) -> float:
@@ -173,6 +183,7 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
     """
     _check(script)
     walk = _Walk(walker, rng)
+    tremors: list[Tremor] = []
     first = {
         s: Footprint(s, -inf, fx, fy, 0.0, foot, 0.0, inf)
         for s in SIDES
@@ -180,6 +191,8 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
     }
     for item, following in zip(script, (*script[1:], Stand(1.0)), strict=True):
         if isinstance(item, Stand):
+            if isinstance(item, Tremble):
+                tremors.append(Tremor(walk.t, walk.t + item.duration_s, item.hz, item.size_rad))
             walk.stand(item.duration_s)
             continue
         moves = item.moves()
@@ -189,7 +202,9 @@ def plan(script: Script, walker: Walker, rng: np.random.Generator) -> Plan:
         for i, move in enumerate(moves):
             walk.step(move, closes=closing and i == len(moves) - 1)
     footprints = {s: (first[s], *(f for f in walk.steps if f.side == s)) for s in SIDES}
-    return Plan(tuple(walk.steps), footprints, tuple(walk.stands), walk.t)
+    if walker.tremor_rad:
+        tremors.append(Tremor(0.0, walk.t, walker.tremor_hz, walker.tremor_rad))
+    return Plan(tuple(walk.steps), footprints, tuple(walk.stands), walk.t, tuple(tremors))
 
 
 @dataclass

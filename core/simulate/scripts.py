@@ -11,6 +11,7 @@ from typing import Final
 from sagittal.core.errors import ParameterError
 from sagittal.core.frames import Segment
 from sagittal.core.simulate.gait.soft_tissue import SoftTissue
+from sagittal.core.simulate.impaired import IMPAIRED
 from sagittal.core.simulate.mems import MEMS
 from sagittal.core.simulate.patients import PATIENTS, QUICKLY, SLOWLY, SimulatedPatient
 from sagittal.core.simulate.script import Arc, Pivot, Script, SingleSteps, Stand, Straight, scale_script
@@ -127,6 +128,12 @@ SCRIPTS: Mapping[str, Scenario] = MappingProxyType(
 )
 
 
+IMPAIRED_WALKS: Mapping[str, Scenario] = MappingProxyType(
+    {name: Scenario(title, script, walker=walker) for name, (title, script, walker) in IMPAIRED.items()}
+)
+"""Scripts of people who do not walk like the textbook."""
+
+
 def simulate_scenario(
     name: str,
     seed: int = 0,
@@ -145,9 +152,10 @@ def simulate_scenario(
     ------
     ParameterError : "unknown_script" (the message lists the names), "height_implausible", "rate_range".
     """
-    if name not in SCRIPTS:
-        raise ParameterError("unknown_script", f"No script '{name}'; expected one of {', '.join(SCRIPTS)}.")
-    scenario = SCRIPTS[name]
+    known = {**SCRIPTS, **IMPAIRED_WALKS}
+    if name not in known:
+        raise ParameterError("unknown_script", f"No script '{name}'; expected one of {', '.join(known)}.")
+    scenario = known[name]
     walker = scenario.walker.scaled_to(height_m)
     setup = replace(
         scenario.setup,

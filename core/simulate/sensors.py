@@ -17,6 +17,7 @@ from sagittal.core.rotation import about, conjugate, exp, log, multiply, rotate
 from sagittal.core.simulate.gait.human import BodyPath
 from sagittal.core.simulate.gait.impacts import Impact, shake_sensor
 from sagittal.core.simulate.gait.soft_tissue import SoftTissue, skin_motion
+from sagittal.core.simulate.gait.tremor import Tremor, tremble_sensor
 from sagittal.core.simulate.magnetics import Dipole, field_at
 from sagittal.core.simulate.spline import differentiate_pose, resample_pose, sign_continuous
 
@@ -102,20 +103,24 @@ def place_sensor(
     mount: Mount,
     tissue: SoftTissue | None,
     impacts: tuple[Impact, ...] = (),
+    tremors: tuple[Tremor, ...] = (),
 ) -> SensorPath:
     """Path of a sensor on a moving body.
 
     Parameters
     ----------
     tissue : between sensor and bone, None = rigid. impacts : contacts that make it vibrate.
+    tremors : of the leg.
     """
     place, turn, bone = mount.position_m, mount.q_segment_sensor, body.q[segment]
     skin = None if tissue is None else skin_motion(body.q, segment, tissue)
     if skin is not None:
         place, turn = place + skin[1], multiply(skin[0], turn)
     p = body.p[segment] + rotate(bone, place)
-    if impacts:
-        shift, angle = shake_sensor(body.t_s, segment, impacts)
+    for shift, angle in (
+        *((shake_sensor(body.t_s, segment, impacts),) if impacts else ()),
+        *((tremble_sensor(body.t_s, segment, tremors),) if tremors else ()),
+    ):
         p, bone = p + shift, multiply(bone, about(2, angle))
     return SensorPath(body.t_s, p, sign_continuous(multiply(bone, turn)))
 

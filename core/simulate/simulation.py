@@ -53,7 +53,8 @@ def simulate(
     motion = move(plan(script, walker, draws.steps), walker, every * setup.rate_hz)
     mounts = draw_mounts(PLACES, walker.scale, setup.mount_spread_rad, draws.mounts)
     impacts = draw_impacts(motion, draws.impacts) if setup.impacts else ()
-    paths = {s: place_sensor(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
+    tremors = motion.plan.tremors
+    paths = {s: place_sensor(motion, s, m, setup.tissue, impacts, tremors) for s, m in mounts.items()}
     recorded = record(paths, setup, draws, walker.height_m)
     truth = truth_of(motion, every, mounts, recorded.errors, seed)
     return Simulation(**vars(recorded), truth=truth)

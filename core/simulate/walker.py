@@ -136,7 +136,8 @@ class Walker:
     tibial_rotation_rad : internal rotation of the shank at 90° of knee flexion. lands_rising : the foot
         pitches up until it touches the floor. People differ in this, and event rules based on the largest
         pitch are early by up to 0.1 s without it (docs/science/simulation.md, "Swing foot").
-    impact : strength of foot contact, 1 = typical at 1.2 m/s.
+    impact : strength of foot contact, 1 = typical at 1.2 m/s. tremor_rad, tremor_hz : amplitude of a
+        permanent tremor of the feet, and its frequency.
     """
 
     height_m: float = REFERENCE_HEIGHT_M
@@ -155,6 +156,8 @@ class Walker:
     tibial_rotation_rad: float = 0.0
     lands_rising: bool = True
     impact: float = 1.0
+    tremor_rad: float = 0.0
+    tremor_hz: float = 5.0
     variability: Variability = Variability()
 
     @classmethod

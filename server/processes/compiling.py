@@ -27,6 +27,7 @@ OFFLINE: Final[tuple[Order, Order]] = (
         ("sagittal.core.signals.rest", "compile_rest_kernels"),
         ("sagittal.core.body.l7s.inputs", "compile_gravity_kernel"),
         ("sagittal.core.events", "compile_foot_contact_kernel"),
+        ("sagittal.core.events", "compile_foot_way_kernel"),
     ),
 )
 """Filters for the analysis of a walk, divided over two processes: the ErKF takes as long as all others."""

@@ -56,7 +56,7 @@ def _warm() -> None:
     import sagittal.server.report.files.exports  # noqa: F401
     from sagittal.core.agreement.slips import compile_agreement_kernels
     from sagittal.core.body import estimate
-    from sagittal.core.events import foot_contact
+    from sagittal.core.events import foot_contact, foot_way
     from sagittal.core.fusion import attitude
     from sagittal.server.processes.compiling import OFFLINE, compile_filters_once
 
@@ -65,6 +65,7 @@ def _warm() -> None:
     attitude.compile_attitude_kernel()
     compile_agreement_kernels()
     foot_contact.compile_foot_contact_kernel()
+    foot_way.compile_foot_way_kernel()
     estimate.compile_erkf_kernels()
 
 

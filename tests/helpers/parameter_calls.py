@@ -21,6 +21,7 @@ from sagittal.core.calibration.table_top import calibrate_table_top
 from sagittal.core.calibration.walking import moving_mask
 from sagittal.core.events.detection import detect_contacts
 from sagittal.core.events.foot_contact import FootContactState, advance_foot_contacts
+from sagittal.core.events.foot_way import FootWayState, advance_foot_ways
 from sagittal.core.events.gyro_peaks import gyro_peak_events
 from sagittal.core.events.lumbar import _sides, detect_steps, find_step_times
 from sagittal.core.events.turns import find_turns
@@ -36,6 +37,7 @@ from tests.core.calibration.test_table_top import carried
 from tests.core.events.foot_signal import foot_pitch, orientation, orientations
 from tests.core.events.test_foot_contact import RATE, burst, moved, walk_pitch
 from tests.core.events.test_gyro_peaks import shanks, swinging
+from tests.helpers.walked_feet import walked_foot
 
 T: Final[Floats] = np.arange(1500) / RATE
 
@@ -75,6 +77,32 @@ def refine_contacts(config: PipelineConfig) -> object:
         "foot_r": foot_pitch(T, 2.0, 8, 1.1, 0.5) - 0.1,
     }
     return notices, detect_contacts(orientations(RATE, tilted), config.events, config.contacts)
+
+
+def go_without_pitch(config: PipelineConfig) -> object:
+    """Feet that shuffle, are dragged, tremble and push off, by the way they move."""
+    told: list[object] = []
+    for name in ("shuffler", "dragged_foot", "trembling", "comfortable"):
+        foot = walked_foot(name, "left")
+        for learns in (True, False):
+            state = FootWayState.start(RATE, config.ways)
+            if not learns:
+                state.learn(foot.q, foot.valid)
+            told.append(advance_foot_ways(state, foot.q, foot.valid, foot.acc))
+    return told
+
+
+def walk_slowly(config: PipelineConfig) -> object:
+    """Legs that turn slowly, with pauses of several lengths between the steps."""
+    valid, still = np.ones(len(T), np.bool_), np.zeros((len(T), 3))
+    moved = np.where(
+        (T > 2.0) & (T < 12.0) & ~((T > 5.0) & (T < 6.0)) & ~((T > 8.0) & (T < 10.2)), 0.25, 0.02
+    )
+    rates = np.stack((0.0 * T, moved * (1.0 + 0.5 * (T > 11.0)), 0.0 * T), axis=1)
+    worn: dict[Segment, SensorSignals] = {
+        "foot_l": SensorSignals("A", still + GRAVITY, rates, None, valid, ~valid)
+    }
+    return moving_mask(UniformRecording(T, RATE, worn, Subject(), "walk", {}), config.calibration.walking)
 
 
 def detect_swings(config: PipelineConfig) -> object:
@@ -325,6 +353,7 @@ CALLS: Final[dict[str, Callable[[PipelineConfig], object]]] = {
         compare_axes,
         detect_swings,
         follow_a_day_s_turns,
+        go_without_pitch,
         hear_legs,
         hear_slips,
         hear_standings,
@@ -339,6 +368,7 @@ CALLS: Final[dict[str, Callable[[PipelineConfig], object]]] = {
         step_with_a_pelvis,
         sway_while_standing,
         tell_feet_beside_turns,
+        walk_slowly,
         watch_sensors,
     )
 }

@@ -21,7 +21,7 @@ from sagittal.core.angles import JointAngles, compute_headings
 from sagittal.core.body.feet import FootTracks
 from sagittal.core.body.model import BodyModel
 from sagittal.core.events.flags import StrideParams, add_flag, find_flags
-from sagittal.core.events.live_contacts import KnownContact
+from sagittal.core.events.live_foot import KnownContact
 from sagittal.core.events.result import GaitEvent, GaitEvents, Stride, StrideFlag
 from sagittal.core.events.strides import NEAR_S, side_strides
 from sagittal.core.frames import FOOT, Floats, Segment, Side

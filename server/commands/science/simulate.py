@@ -39,18 +39,26 @@ def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: f
         duration of daily life, --script activity (default 24)
     """
     from sagittal.core.formats import write_recording
-    from sagittal.core.simulate import MOVEMENTS, SCRIPTS, Simulation, simulate_movement, simulate_scenario
+    from sagittal.core.simulate import (
+        IMPAIRED_WALKS,
+        MOVEMENTS,
+        SCRIPTS,
+        Simulation,
+        simulate_movement,
+        simulate_scenario,
+    )
     from sagittal.core.simulate.functional import FunctionalSimulation
     from sagittal.core.simulate.squat import SquatSimulation
     from sagittal.core.simulate.tug import ChairSimulation
 
     if script == ACTIVITY:
         return _simulate_activity(out, seed, hours)
-    if script not in SCRIPTS and script not in MOVEMENTS:
-        names = ", ".join((*SCRIPTS, *MOVEMENTS, ACTIVITY))
+    walks = {**SCRIPTS, **IMPAIRED_WALKS}
+    if script not in walks and script not in MOVEMENTS:
+        names = ", ".join((*walks, *MOVEMENTS, ACTIVITY))
         sys.stderr.write(f"No script '{script}'; expected one of {names}.\n")
         return 2
-    simulation = simulate_scenario(script, seed) if script in SCRIPTS else simulate_movement(script, seed)
+    simulation = simulate_scenario(script, seed) if script in walks else simulate_movement(script, seed)
     if isinstance(simulation, Simulation):
         files, facts = _walk(simulation.truth)
     elif isinstance(simulation, SquatSimulation):
@@ -61,7 +69,7 @@ def simulate(*, out: Path, script: str = "comfortable", seed: Seed = 1, hours: f
         files, facts = _chair(simulation.truth)
     else:
         files, facts = _chest(simulation.truth)
-    title = (SCRIPTS[script] if script in SCRIPTS else MOVEMENTS[script]).title
+    title = (walks[script] if script in walks else MOVEMENTS[script]).title
     truth = {"script": script, "title": title, "seed": seed, **facts}
     files |= {
         "recording.parquet": write_recording(simulation.recording),

@@ -9,6 +9,7 @@ from sagittal.core.calibration.walking import (
     WalkingParams,
     mean_turn,
     measure_turned_angle,
+    moves_slowly,
     moving_mask,
     straight_parts,
     turn_sensors,
@@ -47,7 +48,10 @@ def test_legs_that_turn_on_the_average_walk() -> None:
     inputs = worn(shank_l=sensor(turns), foot_l=sensor())
     assert edges(moving_mask(inputs, PARAMS)) == pytest.approx([5.0, 15.0], abs=0.5)
     slower = worn(shank_l=sensor(0.8 * turns), foot_l=sensor())
-    assert not moving_mask(slower, PARAMS).any()
+    assert edges(moving_mask(slower, PARAMS)) == pytest.approx([5.0, 15.0], abs=0.5), "at their own pace"
+    assert moves_slowly(slower, PARAMS)
+    assert not moves_slowly(worn(shank_l=sensor(2.0 * turns), foot_l=sensor()), PARAMS)
+    assert not moving_mask(worn(shank_l=sensor(0.15 * turns), foot_l=sensor()), PARAMS).any(), "sway"
 
 
 def test_without_legs_the_trunk_tells_by_how_its_force_varies() -> None:

@@ -213,7 +213,7 @@ def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_severe_shuffle_is_refused_with_its_figure(seed: int) -> None:
+def test_a_severe_shuffle_is_refused_by_the_pitch_rule_with_its_figure(seed: int) -> None:
     result = contacts("severe_shuffle", seed)
     assert result.events == ()
     notices = [n for n in result.notices if n.code == "no_toe_off"]

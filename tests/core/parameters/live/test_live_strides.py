@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from sagittal.core.angles import JointAngles, compute_headings
-from sagittal.core.events.live_contacts import KnownContact
+from sagittal.core.events.live_foot import KnownContact
 from sagittal.core.events.result import GaitEvent
 from sagittal.core.frames import SIDES, Segment, Side
 from sagittal.core.fusion.orientations import Orientations
