@@ -59,7 +59,7 @@ class Unit:
 def list_units() -> list[Unit]:
     """All units of the validation, in the order in which they run."""
     units = []
-    for part, folder, alone in (
+    for part, folder, single in (
         ("accuracy", "validation/accuracy", False),
         ("bench", "validation/bench", True),
         ("faults", "tests/faults", False),
@@ -67,7 +67,7 @@ def list_units() -> list[Unit]:
     ):
         for path in sorted((ROOT / folder).glob("test_*.py")):
             name = str(path.relative_to(ROOT))
-            units.append(Unit(part, name, (name,), alone))
+            units.append(Unit(part, name, (name,), single))
     units.append(Unit("bench", "tests", ("tests", "-m", "bench"), alone=True))
     for path in sorted((ROOT / "tests").rglob("test_*.py")):
         if SWEEP.search(path.read_text("utf-8")):
@@ -99,7 +99,7 @@ def run_unit(unit: Unit, store: Path, code: str, *, whole: bool) -> UnitResult:
     figures.unlink(missing_ok=True)
     environment = {**os.environ, STORE: str(figures), "SAGITTAL_VALIDATION": "whole" if whole else "sample"}
     command = [sys.executable, "-m", "pytest", "-n", "0", "-q", *unit.arguments]
-    began, at = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
+    began, position = time.monotonic(), datetime.now(UTC).isoformat(timespec="seconds")
     done = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
     stored.with_suffix(".log").write_text(done.stdout + done.stderr, encoding="utf-8")
     lines = [line for line in done.stdout.splitlines() if line.strip()]
@@ -112,7 +112,7 @@ def run_unit(unit: Unit, store: Path, code: str, *, whole: bool) -> UnitResult:
         lines[-1].strip("= ") if lines else "",
         time.monotonic() - began,
         code,
-        at,
+        position,
         whole,
         [json.loads(line) for line in recorded],
     )
@@ -183,8 +183,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         "--within", type=float, default=float("inf"), metavar="S", help="start no unit after S seconds"
     )
     options = parser.parse_args(arguments)
-    known = {*parts, *(u.name for u in list_units())}
-    if unknown := [p for p in options.part if p not in known]:
+    reference = {*parts, *(u.name for u in list_units())}
+    if unknown := [p for p in options.part if p not in reference]:
         parser.error(f"no part or unit is called {', '.join(unknown)}; --list lists them")
     if options.write and options.sample:
         parser.error("--write needs all cases: leave out --sample")
@@ -192,7 +192,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what the command line asks for; 1 if a unit failed."""
+    """Run the requested units; 1 if one failed."""
     options = parse(arguments)
     units = [u for u in list_units() if not options.part or {u.part, u.name} & set(options.part)]
     if options.tenth is not None:

@@ -88,22 +88,22 @@ def record_speed(section: str, header: Sequence[str], rows: Sequence[Sequence[st
     _store("section", f"Speed: {section}", format_table(header, rows, note))
 
 
-def record_goal(what: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> None:
+def record_goal(label: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> None:
     """Record whether a performance goal is met.
 
     Parameters
     ----------
     at_least : whether more is better.
     """
-    _store("row", GOALS, format_line(judge_goal(what, goal, ours, unit, at_least=at_least)))
+    _store("row", GOALS, format_line(judge_goal(label, goal, ours, unit, at_least=at_least)))
 
 
-def judge_goal(what: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> tuple[str, ...]:
+def judge_goal(label: str, goal: float, ours: float, unit: str, *, at_least: bool = False) -> tuple[str, ...]:
     """Cells of a goal's row: what, the goal, the value measured, whether it is met."""
     met = ours >= goal if at_least else ours <= goal
     value = f"{ours:.0f}" if ours >= 100.0 else f"{ours:.3g}"
     sign = "≥" if at_least else "≤"
-    return (what, f"{sign} {goal:g} {unit}".rstrip(), f"{value} {unit}".rstrip(), "yes" if met else "no")
+    return (label, f"{sign} {goal:g} {unit}".rstrip(), f"{value} {unit}".rstrip(), "yes" if met else "no")
 
 
 def _record_row(section: str, header: Sequence[str], cells: Sequence[str]) -> None:

@@ -59,29 +59,29 @@ def draw_mutations(count: int, seed: int) -> list[Mutation]:
     sources = {p: p.read_text("utf-8") for p in paths}
     lengths = [len(sources[p].splitlines()) for p in paths]
     operators = sorted(n for n in operator_names() if not n.startswith(NEED_NAMES))
-    found: list[Mutation] = []
-    while len(found) < count:
+    result: list[Mutation] = []
+    while len(result) < count:
         (path,) = rng.choices(paths, lengths)
         operator = rng.choice(operators)
         code = mutate_code(sources[path], get_operator(operator)(), rng.randrange(12))
         changed = _changed_line(sources[path], code) if code else None
         if changed is not None:
             mutation = Mutation(str(path.relative_to(ROOT)), *changed, operator)
-            if mutation not in found:
-                found.append(mutation)
-    return found
+            if mutation not in result:
+                result.append(mutation)
+    return result
 
 
 def _changed_line(source: str, code: str) -> tuple[int, str, str] | None:
-    before, after = source.splitlines(), code.splitlines()
-    if len(before) != len(after):
+    initial, final = source.splitlines(), code.splitlines()
+    if len(initial) != len(final):
         return None
-    lines = [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
+    lines = [i for i, (a, b) in enumerate(zip(initial, final, strict=True)) if a != b]
     try:
         same = ast.dump(ast.parse(source)) == ast.dump(ast.parse(code))
     except SyntaxError:
         return None
-    return None if same or len(lines) != 1 else (lines[0] + 1, before[lines[0]], after[lines[0]])
+    return None if same or len(lines) != 1 else (lines[0] + 1, initial[lines[0]], final[lines[0]])
 
 
 def list_tests(tree: Path, module: str) -> list[str]:
@@ -93,8 +93,8 @@ def list_tests(tree: Path, module: str) -> list[str]:
     nearest = [str(own)] if (tree / own).exists() else []
     importers = {name for name, imported in _imports_below(tree, ROOMS).items() if dotted in imported}
     tests = _imports_below(tree, ("tests",))
-    for wanted in ({dotted}, {package}, importers):
-        nearest += sorted(t for t, imported in tests.items() if wanted & imported)
+    for expected in ({dotted}, {package}, importers):
+        nearest += sorted(t for t, imported in tests.items() if expected & imported)
     files = (name if name.endswith(".py") else name.replace(".", "/") + ".py" for name in nearest)
     unique = [f for f in dict.fromkeys(files) if Path(f).name.startswith("test_")]
     return [f for f in unique if "/browser/" not in f and "/faults/" not in f][:MOST_FILES]
@@ -102,32 +102,32 @@ def list_tests(tree: Path, module: str) -> list[str]:
 
 @cache
 def _imports_below(tree: Path, folders: tuple[str, ...]) -> dict[str, frozenset[str]]:
-    found = {}
+    result = {}
     for folder in folders:
         for path in (tree / folder).rglob("*.py"):
             name = ".".join(path.relative_to(tree).with_suffix("").parts).removesuffix(".__init__")
-            found[name] = frozenset(
+            result[name] = frozenset(
                 i.removeprefix("sagittal.") for i in list_imports(ast.parse(path.read_text("utf-8")))
             )
-    return found
+    return result
 
 
 def judge(tree: Path, mutation: Mutation, marks: str) -> str:
     """Try the tests on one mutation: noticed, survived, or absent where the tree does not have that line."""
     path = tree / mutation.path
     lines = path.read_text("utf-8").splitlines(keepends=True) if path.exists() else []
-    at = next((i for i, line in enumerate(lines) if line.rstrip("\n") == mutation.before), None)
+    index = next((i for i, line in enumerate(lines) if line.rstrip("\n") == mutation.before), None)
     near = mutation.line - 1
     if near < len(lines) and lines[near].rstrip("\n") == mutation.before:
-        at = near
-    if at is None:
+        index = near
+    if index is None:
         return "absent"
     tests = list_tests(tree, mutation.path)
     if not tests:
         return "survived"
     source = "".join(lines)
     try:
-        path.write_text("".join([*lines[:at], mutation.after + "\n", *lines[at + 1 :]]), "utf-8")
+        path.write_text("".join([*lines[:index], mutation.after + "\n", *lines[index + 1 :]]), "utf-8")
         command = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-m", marks, *tests]
         done = subprocess.run(command, cwd=tree, capture_output=True, timeout=LONGEST_S, check=False)
     except subprocess.TimeoutExpired:

@@ -95,12 +95,12 @@ def _put_row(text: str, section: str, new: str) -> str:
     row = new.splitlines()[-1]
     header = format_line(GOALS_HEADER) if section == GOALS else new.splitlines()[0]
     lines = [line for line in text.splitlines() if line.startswith("|")][2:]
-    rest = "\n".join(line for line in text.splitlines() if not line.startswith("|")).strip()
+    strip = "\n".join(line for line in text.splitlines() if not line.startswith("|")).strip()
     rows = {line.split(" | ")[0]: line for line in lines} | {row.split(" | ")[0]: row}
     if section == IN_SHORT:
         rows = {key: rows[key] for figure in KEY_FIGURES if (key := f"| {figure}") in rows}
     rule = format_line(["---"] * (header.count(" | ") + 1))
-    return "\n".join((header, rule, *rows.values())) + (f"\n\n{rest}" if rest else "")
+    return "\n".join((header, rule, *rows.values())) + (f"\n\n{strip}" if strip else "")
 
 
 def list_differences(old: Mapping[str, str], new: Mapping[str, str]) -> str:

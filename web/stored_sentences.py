@@ -1,8 +1,8 @@
-"""Translation of finished English sentences without a template, by matching the patterns of messages.
+"""Texts of sentences that were stored or put together without their templates, guessed from the English.
 
-A `Message` does not need this, as its template is looked up. Results of earlier versions contain finished
-sentences, and some pages still compose theirs from parts. This module can be removed when there are none
-left.
+A `Message` needs none of this: its template is looked up. Results of earlier versions hold finished English
+sentences, and some pages still join theirs from parts; the message that one was made from is found by its
+pattern. This module can go when neither is left.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from sagittal.core.message import PLACEHOLDER, find_verbatim
 from sagittal.web.message_format import ValueFormat, fill_placeholders, match_case
 
 QUOTED: Final = re.compile(r"“((?:[^“”]|“[^“”]*”)*)”")
-"""Quotations are not translated unless a message contains them."""
+"""A quotation: nothing in it is translated, unless a message itself has these words in quotation marks."""
 
 LONGEST: Final = 500
-"""Maximum length of texts matched as a whole; longer ones are matched by sentence."""
+"""Characters up to which a text is looked for as a whole; a longer one by its sentences."""
 
 MOST_PARTS: Final = 12
 
 FIRST_MASK: Final = 0xE000
 MOST_MASKS: Final = 1000
-"""Private-use characters that represent quotations and values during translation."""
+"""Signs of the private use area that stand for quotations and values while a sentence is translated."""
 
 STRONG: Final = 12
-"""Minimum number of literal letters for an unambiguous message."""
+"""Letters of its own from which on a message is not mistaken for another."""
 
 _MEASURED: Final = re.compile(
     r"([−+±≤≥<>]?\d[\d.,−±–\u2009\u202f ]*?)([\u2009\u202f ]?)([^\d\s.,].*)", re.DOTALL
@@ -40,16 +40,16 @@ _NUMBERED: Final = re.compile(
 """A word with its number."""
 _SENTENCE: Final = re.compile(r"(?<=[.!?…])(?<!et al\.)\s+(?=[A-Z0-9“])")
 _JOINS: Final = ("; ", " · ", " → ", " | ", ": ", ", ", " – ", " and ")
-"""Separators that pages put between messages, the strongest first."""
+"""What pages put between parts that are messages of their own, the strongest first."""
 
 CITED: Final = re.compile(
     r"\b(19|20)\d\d\b.*(:|\d\(\d|Proc\.|Conf|Sens|IEEE)|^[A-Z][a-z]+(Martin)?(19|20)\d\d|et al\. (19|20)\d\d$"
 )
-"""References to papers are not translated."""
+"""References to papers stay as they are written."""
 
 
 class SentenceFinder:
-    """Finds the messages from which finished sentences were formatted.
+    """Finds the messages that finished sentences were made from.
 
     Parameters
     ----------
@@ -60,42 +60,40 @@ class SentenceFinder:
     def __init__(self, messages: Mapping[str, str], values: ValueFormat) -> None:
         self.messages = messages
         self._values = values
-        self._folded = {text.casefold(): translation for text, translation in messages.items()}
-        self._patterns = [
-            _Pattern(text, translation) for text, translation in messages.items() if PLACEHOLDER.search(text)
-        ]
-        # of two matches, the one with more literal words
+        self._folded = {text.casefold(): said for text, said in messages.items()}
+        self._patterns = [_Pattern(text, said) for text, said in messages.items() if PLACEHOLDER.search(text)]
+        # of two that fit, the one with more words of its own
         self._patterns.sort(key=lambda p: -p.literal)
         self._own_quotations = {quoted for text in messages for quoted in QUOTED.findall(text)}
         self._known = functools.lru_cache(maxsize=20_000)(self._find)
 
     def find(self, text: str) -> str | None:
-        """Translation of a text; None if no part of it matches a message."""
+        """A text in the language; None where no part of it is made from a message."""
         masked, quotations = self._mask(text)
-        exact = self._known(masked)
-        translation = self._loosely(masked.strip()) if exact is None else exact
-        return None if translation is None else self._unmask(translation, quotations)
+        known = self._known(masked)
+        said = self._loosely(masked.strip()) if known is None else known
+        return None if said is None else self._unmask(said, quotations)
 
     def _mask(self, text: str) -> tuple[str, list[str]]:
         """Replace each quotation by a character that occurs in no message or number."""
         quotations: list[str] = []
 
-        def mask(match: re.Match[str]) -> str:
-            if match[1] in self._own_quotations or len(quotations) == MOST_MASKS:
-                return match[0]
-            quotations.append(match[1])
+        def mask(found: re.Match[str]) -> str:
+            if found[1] in self._own_quotations or len(quotations) == MOST_MASKS:
+                return found[0]
+            quotations.append(found[1])
             return f"“{chr(FIRST_MASK + len(quotations) - 1)}”"
 
         return QUOTED.sub(mask, text), quotations
 
-    def _unmask(self, text: str, quotations: Sequence[str]) -> str:
+    def _unmask(self, said: str, quotations: Sequence[str]) -> str:
         marks = self._values.quotation_marks
         opening, closing = marks.split("{}")
-        text = text.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
+        said = said.replace("”, “", f"{closing}, {opening}")  # a list of them in one placeholder
         for i, quoted in enumerate(quotations):
             mask = chr(FIRST_MASK + i)
-            text = text.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
-        return text
+            said = said.replace(f"“{mask}”", marks.format(mask)).replace(mask, quoted)
+        return said
 
     def _loosely(self, text: str) -> str | None:
         """Translate a sentence with foreign text in it, or several sentences of which some are known."""
@@ -107,20 +105,20 @@ class SentenceFinder:
         inner = text.strip()
         if not inner:
             return text
-        translation = (
+        said = (
             self._exact(inner)
             or self._plain(inner)
             or (self._made(inner) if len(inner) <= LONGEST else None)
             or self._by_sentences(_SENTENCE.split(inner), partly=False)
         )
-        return None if translation is None else text.replace(inner, translation, 1)
+        return None if said is None else text.replace(inner, said, 1)
 
     def _exact(self, text: str) -> str | None:
-        translation = self.messages.get(text)
-        if translation is None:
+        said = self.messages.get(text)
+        if said is None:
             folded = self._folded.get(text.casefold())
-            translation = None if folded is None else match_case(text, folded)
-        return translation
+            said = None if folded is None else match_case(text, folded)
+        return said
 
     def _made(self, text: str) -> str | None:
         return (
@@ -135,21 +133,21 @@ class SentenceFinder:
         """Translate a message followed by a full stop added by a page."""
         if text[-1] not in ".:;" or len(text) < 2:
             return None
-        sentence = self._known(text[:-1])
-        return None if sentence is None else sentence + text[-1]
+        before = self._known(text[:-1])
+        return None if before is None else before + text[-1]
 
     def _plain(self, text: str) -> str | None:
         """Format a date, a number, or a name in capitals."""
         date = self._values.find_date(text)
         if date is not None:
             return date
-        match = _MEASURED.fullmatch(text)
-        if match and match[3] in self.messages:
-            return f"{self._values.localise(match[1])}{match[2]}{self.messages[match[3]]}"
+        found = _MEASURED.fullmatch(text)
+        if found and found[3] in self.messages:
+            return f"{self._values.localise(found[1])}{found[2]}{self.messages[found[3]]}"
         if not re.search(r"[a-zäöüß]", re.sub(r"(?<![^\W\d_])[^\W\d_](?![^\W\d_])", "", text)):
-            # numbers, single letters, names in capitals
-            translation = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
-            return self._values.localise(text) if translation is None else translation
+            # numbers, single letters, names of capitals
+            said = self._by_pattern(text, strong=False) if re.search(r"[^\W\d_]", text) else None
+            return self._values.localise(text) if said is None else said
         return None
 
     def _measured(self, text: str) -> str | None:
@@ -157,13 +155,13 @@ class SentenceFinder:
         numbered = _NUMBERED.fullmatch(text)
         if numbered and (word := self._known(numbered[1])) is not None:
             return word + self._values.localise(numbered[2])
-        match = _MEASURED.fullmatch(text)
-        if not match:
+        found = _MEASURED.fullmatch(text)
+        if not found:
             return None
-        unit = self._exact(match[3]) or self._by_pattern(match[3], strong=False)
-        if unit is None and re.fullmatch(r"\S{1,7}", match[3]):
-            unit = match[3]  # m/s, kHz, MB
-        return None if unit is None else f"{self._values.localise(match[1])}{match[2]}{unit}"
+        unit = self._exact(found[3]) or self._by_pattern(found[3], strong=False)
+        if unit is None and re.fullmatch(r"\S{1,7}", found[3]):
+            unit = found[3]  # m/s, kHz, MB
+        return None if unit is None else f"{self._values.localise(found[1])}{found[2]}{unit}"
 
     def _by_pattern(self, text: str, *, strong: bool, loose: bool = False) -> str | None:
         """Translate a sentence formatted from a message; `loose` = with any values of its placeholders."""
@@ -181,15 +179,15 @@ class SentenceFinder:
         said: dict[str, str] = {}
         settled: dict[str, str] = {}
         for n, (name, value) in enumerate(values.items()):
-            translation = value if name in pattern.verbatim else self._known(value)
-            if translation is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", translation)):
+            known = value if name in pattern.verbatim else self._known(value)
+            if known is not None and (name in pattern.verbatim or re.search(r"[^\W\d_]", known)):
                 mask = chr(FIRST_MASK + MOST_MASKS + n)
-                replacements[name], settled[mask] = mask, translation
+                said[name], settled[mask] = mask, known
             else:
-                # two adjacent placeholders may share a number
-                replacements[name] = value if translation is None else translation
-        filled = self._values.localise(fill_placeholders(pattern.said, replacements))
-        return re.sub("|".join(settled) or "(?!)", lambda match: settled[match[0]], filled)
+                # a number may stand in two placeholders side by side
+                said[name] = value if known is None else known
+        filled = self._values.localise(fill_placeholders(pattern.said, said))
+        return re.sub("|".join(settled) or "(?!)", lambda found: settled[found[0]], filled)
 
     def _stands_alone(self, value: str) -> bool:
         """Whether a value is a single word or complete message rather than part of a sentence."""
@@ -204,36 +202,34 @@ class SentenceFinder:
         for join in _JOINS:
             if text.count(join) >= MOST_PARTS:
                 continue
-            position = text.rfind(join)
-            while position > 0:
-                translation = self._join(text[:position], join, text[position + len(join) :])
-                if translation is not None:
-                    return translation
-                position = text.rfind(join, 0, position)
+            at = text.rfind(join)
+            while at > 0:
+                said = self._join(text[:at], join, text[at + len(join) :])
+                if said is not None:
+                    return said
+                at = text.rfind(join, 0, at)
         return None
 
     def _join(self, first: str, join: str, second: str) -> str | None:
         if not first or not second:
             return None
-        # "; and so on" may be a message including its separator
+        # "; and so on" may be a message with what joins it
         tail = self.messages.get(f"{join}{second}".strip()) or self._by_pattern(
             f"{join}{second}".strip(), strong=True
         )
         head = self._known(first)
         if head is None:
             head = self.messages.get(f"{first}{join.rstrip()}")
-            if head is not None and (second_part := self._known(second)) is not None:
-                return f"{head} {second_part}"
+            if head is not None and (rest := self._known(second)) is not None:
+                return f"{head} {rest}"
             return None
         if tail is not None:
             return f"{head}{tail}" if tail[0] in ",;:" else f"{head} {tail}"
-        second_part = self._known(second)
-        if second_part is None:
+        rest = self._known(second)
+        if rest is None:
             return None
         return (
-            f"{head} {self.messages.get('and', 'and')} {second_part}"
-            if join == " and "
-            else f"{head}{join}{second_part}"
+            f"{head} {self.messages.get('and', 'and')} {rest}" if join == " and " else f"{head}{join}{rest}"
         )
 
     def _by_sentences(self, sentences: list[str], *, partly: bool) -> str | None:
@@ -245,26 +241,26 @@ class SentenceFinder:
         while sentences and (len(sentences) > 1 or said):
             for n in range(len(sentences), 0, -1):
                 whole = " ".join(sentences[:n])
-                translation = self._exact(whole)
-                if translation is None and len(whole) <= LONGEST:
-                    translation = self._by_pattern(whole, strong=True, loose=partly)
-                if translation is None and n == 1:
-                    translation = self._known(whole)
-                if translation is None and n == 1 and not partly:
+                known = self._exact(whole)
+                if known is None and len(whole) <= LONGEST:
+                    known = self._by_pattern(whole, strong=True, loose=partly)
+                if known is None and n == 1:
+                    known = self._known(whole)
+                if known is None and n == 1 and not partly:
                     return None
-                if translation is not None or n == 1:
-                    parts.append(whole if translation is None else translation)
-                    is_translated = is_translated or translation is not None
+                if known is not None or n == 1:
+                    said.append(whole if known is None else known)
+                    found = found or known is not None
                     sentences = sentences[n:]
                     break
-        return " ".join(parts) if is_translated else None
+        return " ".join(said) if found else None
 
 
 class _Pattern:
     """Pattern of the sentences formatted from one message."""
 
-    def __init__(self, text: str, translation: str) -> None:
-        self.said = translation
+    def __init__(self, text: str, said: str) -> None:
+        self.said = said
         self.verbatim = find_verbatim(text)
         pieces = PLACEHOLDER.split(text)
         self.names = pieces[1::2]
@@ -273,21 +269,16 @@ class _Pattern:
         self.is_strong = len(re.findall(r"[^\W\d_]", "".join(literals))) >= STRONG
         self._stops = not literals[-1] or literals[-1].endswith(".")
         if not literals[-1] and literals[-2] and not literals[-2].rstrip().endswith((".", ":")):
-            self._stops = False  # the last literal is not a sentence
+            self._stops = False  # what stands last is no sentence
         self._longest = max(literals, key=len).casefold()
-        first, *later_literals = map(re.escape, literals)
-        # of two values without a word in between, the first is a number and the second its unit
+        first, *rest = map(re.escape, literals)
+        # of two values without a word between, the one before is a number and the other its unit
         forms = [
             first
             + "".join(
-                (value if piece or i == len(later_literals) else value_before) + piece
-                for i, piece in enumerate(later_literals, 1)
+                (value if piece or i == len(rest) else before) + piece for i, piece in enumerate(rest, 1)
             )
-            for value, value_before in (
-                ("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"),
-                ("(.+?)", "(.+?)"),
-                ("(.+)", "(.+)"),
-            )
+            for value, before in (("(.+?)", r"([−+-]?\d+(?:\.\d+)?)"), ("(.+?)", "(.+?)"), ("(.+)", "(.+)"))
         ]
         self._forms = [re.compile(form, re.DOTALL | re.IGNORECASE) for form in dict.fromkeys(forms)]
 
@@ -295,9 +286,9 @@ class _Pattern:
         """Yield possible values of the placeholders; none if the text does not match."""
         if (text.endswith(".") and not self._stops) or self._longest not in text.casefold():
             return
-        previous: tuple[str, ...] = ()
+        before: tuple[str, ...] = ()
         for form in self._forms:
-            result = form.fullmatch(text)
-            if result is not None and result.groups() != previous:
-                previous = result.groups()
-                yield dict(zip(self.names, previous, strict=True))
+            found = form.fullmatch(text)
+            if found is not None and found.groups() != before:
+                before = found.groups()
+                yield dict(zip(self.names, before, strict=True))

@@ -1,4 +1,4 @@
-"""A session with an open live take, and a tablet with the capture page: what the tests of that page share."""
+"""Session with an open live trial and a paired tablet for the tests of the capture page."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class Clinic:
 
 def stored_log(client: httpx.Client, server: RunningServer, session: str) -> bytes:
     """The recording's only file, as the server keeps it."""
-    found = client.get(f"/api/v1/sessions/{session}/recording").raise_for_status().json()
-    (file,) = found["files"]
+    body = client.get(f"/api/v1/sessions/{session}/recording").raise_for_status().json()
+    (file,) = body["files"]
     (path,) = (p for p in (server.folder / "blobs").rglob(f"*{file['sha256']}") if p.is_file())
     return path.read_bytes()
 
@@ -50,10 +50,10 @@ def clinic(running: RunningServer, request: pytest.FixtureRequest) -> Iterator[C
     with running.client() as client:
         code = f"CAP-{hashlib.sha256(request.node.name.encode()).hexdigest()[:8]}"
         patient = filling.add(client, "/patients", code=code, height_m=1.75)["id"]
-        made = Clinic(client, filling.add_session(client, patient, "Walk, 10 m overground"))
-        yield made
-        if made.take()["state"] in {"pairing", "open", "streaming"}:
-            made.post("/live/close")
+        new_clinic = Clinic(client, filling.add_session(client, patient, "Walk, 10 m overground"))
+        yield new_clinic
+        if new_clinic.take()["state"] in {"pairing", "open", "streaming"}:
+            new_clinic.post("/live/close")
 
 
 @pytest.fixture
@@ -69,21 +69,21 @@ def _kept_tablets(server: RunningServer) -> KeptContexts:
 
 
 @contextmanager
-def tablet(browser: Browser, at: RunningServer | Network) -> Iterator[Page]:
-    """The capture page on a tablet that holds nothing.
+def tablet(browser: Browser, position: RunningServer | Network) -> Iterator[Page]:
+    """Capture page on a tablet with empty storage.
 
-    The tablets of a server share their context one after another; behind a network each has its own.
+    Tablets of a server share one browser context in turn; with a simulated network each has its own.
     """
-    kept = _kept_tablets(at) if isinstance(at, RunningServer) else None
-    context = kept.take(browser) if kept else browser.new_context(base_url=at.url)
+    retained = _kept_tablets(position) if isinstance(position, RunningServer) else None
+    context = retained.take(browser) if retained else browser.new_context(base_url=position.url)
     page = context.new_page()
     page.set_viewport_size({"width": 810, "height": 1080})
     page.goto("/capture")
     try:
         yield page
     finally:
-        if kept:
-            kept.clean()
+        if retained:
+            retained.clean()
         else:
             context.close()
 

@@ -1,4 +1,4 @@
-"""Clicks and counts them: what a person has to do to get somewhere."""
+"""Count the clicks a task needs."""
 
 from __future__ import annotations
 

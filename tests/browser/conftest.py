@@ -124,11 +124,11 @@ class RunningServer:
 
 @contextlib.contextmanager
 def serve(folder: Path, *, records_only: bool = False) -> Iterator[RunningServer]:
-    """Run `sagittal serve` on a data folder; what it says is in server.log there.
+    """Run `sagittal serve` on a data folder; its output goes to server.log there.
 
     Parameters
     ----------
-    records_only : it takes files and live takes, and has no processes that analyse or estimate.
+    records_only : accept files and live trials without starting workers and estimators.
     """
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
@@ -183,11 +183,11 @@ def _wait_until_ready(url: str, process: subprocess.Popen[bytes], log: Path) -> 
 
 def _parents() -> dict[int, int]:
     """Process id → its parent's, from /proc."""
-    found = {}
+    result = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
-            found[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
-    return found
+            result[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+    return result
 
 
 @pytest.fixture(scope="session")
@@ -201,13 +201,13 @@ def playwright_() -> Iterator[Playwright]:
 
 @pytest.fixture(scope="session")
 def console() -> Console:
-    """What the consoles of all pages of all tests say."""
+    """Console messages of all pages of all tests."""
     return Console()
 
 
 @pytest.fixture(autouse=True)
 def quiet_console(console: Console) -> Iterator[None]:
-    """A test fails when a page logs an unexpected error or warning, or throws what nobody catches."""
+    """Fail the test if a page logs an unexpected error or warning, or throws an uncaught exception."""
     yield
     messages = console.take()
     assert not messages, messages
@@ -252,10 +252,10 @@ def cookies(running: RunningServer) -> list[dict[str, str]]:
 
 
 class KeptContexts:
-    """Contexts that all tests share, one for a browser and a language, signed in or not.
+    """Browser contexts shared by all tests: one per browser and language, signed in or not.
 
-    A page in a context of its own costs a second of processor time more: for a new process, and for every
-    script and style that it loads and compiles again. What a test leaves behind is taken out after it.
+    A new context costs a second of CPU time for its process and for compiling all scripts and styles. State
+    left by a test is removed after it.
     """
 
     def __init__(self, url: str, cookies: list[dict[str, str]]) -> None:
@@ -268,23 +268,23 @@ class KeptContexts:
     ) -> BrowserContext:
         """The one of this browser and language, made at its first use; `script` runs in every document."""
         if (browser, locale, signed_in) not in self._all:
-            made = browser.new_context(locale=locale, base_url=self._url, viewport=DESK)
-            made.set_default_timeout(60_000)
+            output = browser.new_context(locale=locale, base_url=self._url, viewport=DESK)
+            output.set_default_timeout(60_000)
             if script:
-                made.add_init_script(script)
+                output.add_init_script(script)
             if signed_in:
-                made.add_cookies(self._cookies)  # type: ignore[arg-type]
-            made.new_page().goto(REST)  # stays, and with it the process of its pages
-            self._all[browser, locale, signed_in] = made
-        found = self._all[browser, locale, signed_in]
-        self._used[found] = signed_in
-        return found
+                output.add_cookies(self._cookies)  # type: ignore[arg-type]
+            output.new_page().goto(REST)  # stays, and with it the process of its pages
+            self._all[browser, locale, signed_in] = output
+        result = self._all[browser, locale, signed_in]
+        self._used[result] = signed_in
+        return result
 
     def clean(self) -> None:
-        """Close the pages of a test, and forget what they stored."""
+        """Close the pages of a test and clear their storage."""
         for context, signed_in in self._used.items():
-            first, *others = context.pages
-            for page in others:
+            first, *remaining = context.pages
+            for page in remaining:
                 page.close()
             if not first.url.endswith(REST):
                 first.on("dialog", _accept)  # what a test typed and did not send may go
@@ -394,15 +394,15 @@ def clinic_files() -> ClinicFiles:
 
 @pytest.fixture(scope="session")
 def filled(clinic_files: ClinicFiles) -> Filled:
-    """What the clinic of `running` has from its beginning."""
+    """Initial content of the clinic of `running`."""
     return clinic_files[0]
 
 
 @keep_served
 def _make_clinic(day: dt.date) -> ClinicFiles:
-    """Fill a clinic through the API, once for all processes and every `day`: pages say what is of today."""
-    with tempfile.TemporaryDirectory(dir=os.environ.get("PYTEST_DEBUG_TEMPROOT")) as made:
-        folder = Path(made)
+    """Fill a clinic through the API, once per `day` for all processes, so that dates on pages are current."""
+    with tempfile.TemporaryDirectory(dir=os.environ.get("PYTEST_DEBUG_TEMPROOT")) as temporary_directory:
+        folder = Path(temporary_directory)
         make_keys(folder / "identity.key")  # this clinic keeps names
         upgrade(folder / "sagittal.db")
         with contextlib.closing(Database(folder / "sagittal.db")) as db, db.write() as c:
@@ -425,7 +425,7 @@ def _fill(client: httpx.Client) -> Filled:
         note="Stroke, left side affected",
     )["id"]
     filling.add(client, "/patients", code="P-0043", sex="female", birth_year=1951)
-    other = filling.add(client, "/patients", code="P-0047", note="Knee, after ligament repair")["id"]
+    second = filling.add(client, "/patients", code="P-0047", note="Knee, after ligament repair")["id"]
     done = filling.add_session(client, patient, "Walk, own pace", note="Barefoot, no aid")
     earlier = filling.add_session(client, patient, "Walk, first visit", performed_on="2026-10-21")
     for session in (done, earlier):
@@ -434,11 +434,11 @@ def _fill(client: httpx.Client) -> Filled:
     filling.add(client, f"/patients/{patient}/programmes", starts_on="2026-10-26")
     unmapped = filling.add_session(client, patient, "Walk, with stick", performed_on="2026-11-20")
     filling.upload(client, unmapped, files)
-    unread = filling.add_session(client, other, "Walk")
+    unread = filling.add_session(client, second, "Walk")
     filling.upload(client, unread, {"notes.txt": b"no recording at all\n"})
-    unusable = filling.add_session(client, other, "Walk, one sensor", performed_on="2026-11-19")
+    unusable = filling.add_session(client, second, "Walk, one sensor", performed_on="2026-11-19")
     name, content = next(iter(files.items()))
     filling.upload(client, unusable, {name: content})
     filling.analyse(client, unusable, {next(iter(sensors)): "shank_l"})
-    empty = filling.add_session(client, other, "Walk, later", performed_on="2026-11-21")
+    empty = filling.add_session(client, second, "Walk, later", performed_on="2026-11-21")
     return Filled(patient, done, earlier, unread, unmapped, unusable, empty)

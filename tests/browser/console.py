@@ -17,7 +17,7 @@ ASSETS: Final = ("/static/", "/texts/", "/views/client/")
 
 
 class Console:
-    """Collects what the pages of all watched browsers say."""
+    """Collect console messages of all watched browsers."""
 
     def __init__(self) -> None:
         self._messages: list[str] = []
@@ -49,12 +49,12 @@ class Console:
             self._messages.append(f"{message.type} at {address}: {message.text}")
 
     def _hear_error(self, error: WebError) -> None:
-        where = error.page.url if error.page else ""
-        self._messages.append(f"uncaught at {where}: {error.error}")
+        location = error.page.url if error.page else ""
+        self._messages.append(f"uncaught at {location}: {error.error}")
 
 
 def is_expected(text: str, address: str) -> bool:
-    """Tell whether the browser, not a page, says this of what a test provokes: a refusal or a lost line."""
+    """Whether a browser message results from a provoked refusal or lost connection."""
     if text.startswith("Failed to load resource"):
         return not urlsplit(address).path.startswith(ASSETS) or "net::ERR" in text
     if text.startswith(READBACK):

@@ -24,8 +24,8 @@ CHECKS = (Path(__file__).parent / "design.js").read_text()
 
 def layout_faults(page: Page) -> dict[str, Any]:
     """What of the layout breaks the design rules; empty when nothing does."""
-    found: dict[str, Any] = page.evaluate(f"{CHECKS}.layout()")
-    return {k: v for k, v in found.items() if v}
+    fields: dict[str, Any] = page.evaluate(f"{CHECKS}.layout()")
+    return {k: v for k, v in fields.items() if v}
 
 
 def text_faults(page: Page) -> dict[str, str]:
@@ -35,19 +35,19 @@ def text_faults(page: Page) -> dict[str, str]:
 
 
 def axe_faults(page: Page, *, contrast: bool = True) -> list[str]:
-    """What axe finds against WCAG 2.2 AA on the page as it stands; nothing where axe is not installed.
+    """WCAG 2.2 AA violations that axe finds on the page; empty where axe is not installed.
 
     Parameters
     ----------
-    contrast : of text too, which takes longer than all other rules; `text_faults` tells it too.
+    contrast : include the contrast of text, the slowest rule; `text_faults` reports it too.
     """
     if not AXE.exists():
         return []
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(AXE.read_text())
     rules = {"color-contrast": {"enabled": contrast}}
-    found: list[str] = page.evaluate(RUN_AXE, [list(TAGS), rules])
-    return found
+    names: list[str] = page.evaluate(RUN_AXE, [list(TAGS), rules])
+    return names
 
 
 SIZES = ((1280, 800), (1024, 768), (810, 1080), (360, 740))
@@ -71,8 +71,8 @@ def all_faults(page: Page) -> list[str]:
             # without motion: colours must not be read in the middle of a transition
             page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
             page.wait_for_timeout(30)
-            found = (layout_faults(page) if scheme == schemes[0] else {}) | text_faults(page)
-            faults += [f"{width} {scheme}: {found}"] if found else []
+            result = (layout_faults(page) if scheme == schemes[0] else {}) | text_faults(page)
+            faults += [f"{width} {scheme}: {result}"] if result else []
             # axe takes longer than all else here: it looks once wide and once narrow, at contrast once
             if (width, scheme) in ((DESK_PX, "light"), (UPRIGHT_PX, "dark")):
                 found_by_axe = axe_faults(page, contrast=scheme == "light")

@@ -1,4 +1,4 @@
-"""What the feed of a live session says, made with the server's own encoder, and a browser that is told it."""
+"""Messages of a live session's feed, made with the server's encoder, and a browser that receives them."""
 
 from __future__ import annotations
 
@@ -60,14 +60,14 @@ def frame(t: float, stage: Stage = "running", *, stale: bool = False, contact: s
         [[angle(n[:-2], phases(s)[_side(n)] or 0.0) for n in NAMES] for s in (t - 0.02, t - 0.01, t)]
     )
     checks = tuple(SegmentCheck(s, still=stage == "stand") for s in SEGMENTS)  # type: ignore[arg-type]
-    shown = LiveFrame(
+    view = LiveFrame(
         t, 0, stage, health(), CalibrationView(2.0, 4.0 if stage == "walk" else 0.0, 5, checks), "erkf",
         contact={"left": "l" in contact, "right": "r" in contact},
         angles=dict(zip(NAMES, values[-1], strict=True)),
     )  # fmt: skip
     trail = AngleTrail(np.array([t - 0.02, t - 0.01, t]), NAMES, values)
-    slow = wire.slow_part(shown, {"00B40B00": 84.0, "00B40B05": 9.0})
-    body = wire.frame(shown, [trail], slow, phase)
+    slow = wire.slow_part(view, {"00B40B00": 84.0, "00B40B05": 9.0})
+    body = wire.frame(view, [trail], slow, phase)
     return (
         body + b',"delay_ms":%d,"stale":%s}' % (640 if stale else 58, b"true" if stale else b"false")
     ).decode()
@@ -78,11 +78,11 @@ def stride(n: int, side: Side, value: float | None, *, speed: float = 1.1) -> st
     start = n * STRIDE_S / 2
     curves = {a: np.array([angle(a, p) for p in range(101)]) for a in ANGLES}
     values = {"step_length_m": value, "gait_speed_mps": speed, "stride_time_s": STRIDE_S}
-    told = LiveStride(
+    notices = LiveStride(
         n, side, start, start + 0.64 * STRIDE_S, start + STRIDE_S, start + STRIDE_S, values, {}, curves,
         0.0, (), counted=True, complete=True,
     )  # fmt: skip
-    return json.dumps(wire.stride(told))
+    return json.dumps(wire.stride(notices))
 
 
 def cue(n: int, value: float, zone: Zone, why_not: WhyNot | None = None, *, level: int = 2) -> str:
@@ -90,11 +90,11 @@ def cue(n: int, value: float, zone: Zone, why_not: WhyNot | None = None, *, leve
     error = (value - TARGET) / SD
     tone = Tone(440.0 + 100.0 * error, 0.5) if zone != "in" and why_not is None else None
     start = n * STRIDE_S / 2
-    given = Cue(
+    inputs = Cue(
         n, "left", start, start + STRIDE_S, value, error, zone, why_not is None, why_not,
         level, TARGET - SD, TARGET + SD, tone,
     )  # fmt: skip
-    return json.dumps(wire.cue(given))
+    return json.dumps(wire.cue(inputs))
 
 
 def feedback(**changed: Any) -> str:
@@ -110,7 +110,7 @@ def feedback(**changed: Any) -> str:
 
 
 def state(name: str = "streaming", tablet: str = "connected", **more: Any) -> str:
-    """Where the take stands."""
+    """State message of a trial."""
     return json.dumps(
         {"type": "state", "take": TAKE, "state": name, "tablet": tablet, "source": "dot", "count": 900,
          "elapsed_s": 252, "sensors": [], "marks": [], "ghost": None, "stale": False, "stopping": False,
@@ -145,16 +145,16 @@ class Told:
         self.page.wait_for_timeout(60)
 
     def say_fresh(self, *messages: str, stage: Stage = "running", contact: str = "") -> None:
-        """Send a new frame and these messages, so that a page takes them for no old ones, however slow it is.
+        """Send a new frame and these messages with time stamps that a slow page still accepts as current.
 
-        A page pauses when it has heard nothing for half a second, or when frames come later than their time
-        says: so the time of each is later than any machine is slow.
+        Pages pause after half a second without messages, or when frames are late; each time stamp lies
+        further in the future than any test machine is slow.
         """
         self.at_s += 100.0
         self.say(frame(self.at_s, stage, contact=contact), *messages)
 
     def walk(self, values: Sequence[float], zones: Sequence[Zone]) -> None:
-        """A running take with these left strides and a right one beside each."""
+        """Running trial with these left strides, each followed by a right one."""
         self.say(state(), feedback())
         for i, (value, zone) in enumerate(zip(values, zones, strict=True)):
             self.say(stride(2 * i, "left", value), cue(2 * i, value, zone, None if i % 2 else "faded"))

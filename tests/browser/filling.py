@@ -16,16 +16,16 @@ from tests.helpers.kept import keep
 @keep
 def simulated_files() -> tuple[Mapping[str, bytes], Mapping[str, str | None]]:
     """A simulated walk as MT Manager text by file name, and which sensor is on which segment."""
-    made = simulate_scenario("comfortable", 1)
-    return mt_files(made.recording, "walk"), dict(made.recording.segments)
+    simulation = simulate_scenario("comfortable", 1)
+    return mt_files(simulation.recording, "walk"), dict(simulation.recording.segments)
 
 
 def add(client: httpx.Client, path: str, **body: Any) -> dict[str, Any]:
     """Post JSON and return the answer."""
     answer = client.post(f"/api/v1{path}", json=body)
     assert answer.is_success, answer.text
-    made: dict[str, Any] = answer.json()
-    return made
+    fields: dict[str, Any] = answer.json()
+    return fields
 
 
 def add_session(client: httpx.Client, patient_id: str, title: str, **more: Any) -> str:
@@ -52,8 +52,8 @@ def analyse(
     config: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Analyse with this mapping and wait for the end; returns the job."""
-    asked = {"manifest": {"sensors": dict(sensors)}, "config": dict(config or {})}
-    return wait(client, add(client, f"/sessions/{session_id}/analyses", **asked)["id"])
+    requests = {"manifest": {"sensors": dict(sensors)}, "config": dict(config or {})}
+    return wait(client, add(client, f"/sessions/{session_id}/analyses", **requests)["id"])
 
 
 def wait(client: httpx.Client, job_id: str) -> dict[str, Any]:

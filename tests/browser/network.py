@@ -23,7 +23,7 @@ class Network:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def lead_to(self, url: str) -> None:
-        """Relay what comes from now on to this server."""
+        """Relay new connections to this server."""
         parts = urlsplit(url)
         self._target = (parts.hostname or "127.0.0.1", parts.port or 80)
 
@@ -40,7 +40,7 @@ class Network:
         self._frozen.set()
 
     def mend(self) -> None:
-        """Be there again; what was frozen stays lost."""
+        """Restore the connection; frozen data stay lost."""
         if self._frozen.is_set():
             self.cut()
             self._frozen.clear()

@@ -1,4 +1,4 @@
-"""What the 3D figure's frame shows, waited for: how soon it is drawn is the machine's affair."""
+"""Wait for the content of the 3D view's frame, independent of rendering speed."""
 
 from __future__ import annotations
 
@@ -46,20 +46,20 @@ DRAWN = """() => new Promise(done => {
 """Three frames later, at once (conftest.py, PACED): a message is taken in one, drawn in the next."""
 
 
-def wait_for_picture(page: Page, wanted: Callable[[Mapping[str, float]], bool]) -> dict[str, float]:
-    """Take pictures of the frame until its colours are as wanted; what `COUNT` found in that one.
+def wait_for_picture(page: Page, expected: Callable[[Mapping[str, float]], bool]) -> dict[str, float]:
+    """Take screenshots of the frame until its colours match, and return the result of `COUNT`.
 
     Raises
     ------
     AssertionError
-        they are not within `PATIENCE_S`; it tells the last picture's colours.
+        no match within `PATIENCE_S`; the message gives the last colours.
     """
     end = time.monotonic() + PATIENCE_S
     while True:
-        found: dict[str, float] = page.evaluate(COUNT, base64.b64encode(take_picture(page)).decode())
-        if wanted(found):
-            return found
-        assert time.monotonic() < end, found
+        result: dict[str, float] = page.evaluate(COUNT, base64.b64encode(take_picture(page)).decode())
+        if expected(result):
+            return result
+        assert time.monotonic() < end, result
         page.wait_for_timeout(50)
 
 
@@ -77,7 +77,7 @@ def wait_until_still(page: Page) -> dict[str, float]:
 
 
 def take_picture(page: Page) -> bytes:
-    """The frame of the session's figure, or of the live one, as PNG, once it has drawn what it was told."""
+    """PNG of the replay or live frame once all drawing commands are done."""
     frame = page.locator("gait-view iframe, live-view iframe")
     with suppress(Error):  # a frame that is just loading has drawn nothing yet
         inside = frame.element_handle(timeout=1000).content_frame()

@@ -36,8 +36,8 @@ def _training() -> Simulation:
 
 @contextmanager
 def walking(running: RunningServer, prescription: Mapping[str, Any] = LONGER) -> Iterator[str]:
-    """The session of somebody who walks from now on, until told to stop at the end."""
-    made = _training()
+    """Session of a person who walks until stopped."""
+    result = _training()
     with running.client() as client:
         patient = filling.add(
             client, "/patients", code=f"LIVE-{uuid4().hex[:4]}", sex="male", birth_year=1968,
@@ -46,7 +46,7 @@ def walking(running: RunningServer, prescription: Mapping[str, Any] = LONGER) ->
         filling.add(client, f"/patients/{patient['id']}/prescriptions", **prescription)
         session = filling.add_session(client, patient["id"], "Training 10, week 5")
         code = filling.add(client, f"/sessions/{session}/live")["code"]
-        walk = made.recording
+        walk = result.recording
         stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, walk)))
         stream.start()
         try:
@@ -58,7 +58,7 @@ def walking(running: RunningServer, prescription: Mapping[str, Any] = LONGER) ->
 
 
 def until_strides(page: Page, count: int, timeout_s: float = 90) -> None:
-    """Wait until the therapist's page has been told of so many cues and shows them."""
+    """Wait until the therapist's page has received and shows this many cues."""
     page.wait_for_function(
         "n => (document.querySelector('live-page').feed?.cues.length ?? 0) >= n",
         arg=count,

@@ -1,4 +1,4 @@
-"""The camera in real Chromium: asked for, recorded though the line breaks, played beside the take."""
+"""Camera in Chromium: permission, recording across a lost connection, playback with the trial."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_a_refused_camera_is_said_and_disturbs_nothing(
 
 def test_only_the_capture_page_may_use_a_camera(running: RunningServer) -> None:
     allowed = httpx.get(f"{running.url}/capture").headers["Permissions-Policy"]
-    other = httpx.get(f"{running.url}/sign-in").headers["Permissions-Policy"]
+    other_headers = httpx.get(f"{running.url}/sign-in").headers["Permissions-Policy"]
     assert "camera=(self)" in allowed
-    assert "camera=()" in other
+    assert "camera=()" in other_headers
     assert "microphone=()" in allowed

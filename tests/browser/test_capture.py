@@ -167,8 +167,8 @@ def test_a_server_that_dies_in_the_middle_has_everything_in_the_end(flat: Browse
             server = servers.enter_context(serve(tmp_path, records_only=True))
             network.lead_to(server.url)
             expect(page.locator("[data-done]")).to_have_text("Recording is on the server", timeout=60_000)
-        with server.client() as again:
-            records, _ = scan(stored_log(again, server, session))
+        with server.client() as second_client:
+            records, _ = scan(stored_log(second_client, server, session))
     samples = np.concatenate([decode_batch(r.body).samples[:, 0, :6] for r in records if r.kind == "B"])
     np.testing.assert_array_equal(samples, np.array(rows)[:, 1:].astype(np.float32))
 
@@ -250,11 +250,11 @@ def test_what_is_left_when_the_take_was_closed_can_be_saved(
         acknowledged = page.evaluate("() => document.querySelector('capture-page').outbox.acked")
         with page.expect_download() as saving:
             page.get_by_role("button", name="Save remaining data").click()
-        rest = saving.value.path().read_bytes()
+        content = saving.value.path().read_bytes()
         page.get_by_role("button", name="Delete it").first.click()
         page.locator("dialog[open]").get_by_role("button", name="Delete it").click()
         expect(page.get_by_label("Pairing code")).to_be_visible()
-    recording = read_recording([SourceFile("rest.sagittal-live", len(rest), lambda: rest)], None)
+    recording = read_recording([SourceFile("rest.sagittal-live", len(content), lambda: content)], None)
     acc = expected_samples()["00B40C55"][:, :3]
     left = recording.streams["00B40C55"].acc.astype(np.float32)
     np.testing.assert_array_equal(left, acc[5 * acknowledged : 5 * acknowledged + len(left)])
@@ -275,9 +275,9 @@ def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(
         until(page, "page.outbox.acked > 5")
         page.locator("[data-go]").click()
         expect(page.locator("[data-done]")).to_be_visible(timeout=20_000)
-        again = clinic.post("/live")["code"]
+        second_response = clinic.post("/live")["code"]
         page.locator("[data-go]").click()
-        pair(page, again)
+        pair(page, second_response)
         page.reload()
         expect(page.locator("[data-paired]")).to_contain_text("Paired with CAP-")
         choose(page, walk_files())
@@ -287,9 +287,9 @@ def test_a_tablet_keeps_its_pairing_and_its_mapping_over_a_reload(
 def test_a_second_tab_stays_away(flat: Browser, running: RunningServer) -> None:
     with tablet(flat, running) as page:
         expect(page.get_by_label("Pairing code")).to_be_visible()
-        other = page.context.new_page()
-        other.goto("/capture")
-        expect(other.get_by_role("alert")).to_contain_text("another tab")
+        other_other_page = page.context.new_page()
+        other_other_page.goto("/capture")
+        expect(other_other_page.get_by_role("alert")).to_contain_text("another tab")
 
 
 def test_every_state_of_the_page_obeys_the_design_system(
@@ -303,8 +303,8 @@ def test_every_state_of_the_page_obeys_the_design_system(
             for scheme in ("light", "dark"):
                 page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
                 page.wait_for_timeout(30)
-                found = layout_faults(page) | text_faults(page)
-                faults.extend([f"{name} {width} {scheme}: {found}"] if found else [])
+                result = layout_faults(page) | text_faults(page)
+                faults.extend([f"{name} {width} {scheme}: {result}"] if result else [])
                 small = page.evaluate(
                     "() => [...document.querySelectorAll('button, input')]"
                     ".filter((e) => e.offsetHeight && (e.closest('label.check') ?? e).offsetHeight < 56)"

@@ -1,4 +1,4 @@
-"""What the tablet reads and writes, in real Chromium, against the server's own reading of the same bytes."""
+"""Tablet codecs in Chromium compared with the server's own decoding of the same bytes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ HELLO = {
 
 @pytest.fixture(scope="module")
 def blank(flat: Browser, running: RunningServer) -> Iterator[Page]:
-    """A page of our origin without scripts of its own, to import modules into."""
+    """Empty page of our origin for importing modules."""
     context = flat.new_context(base_url=running.url)
     page = context.new_page()
     page.goto("/static/icon.svg")
@@ -44,7 +44,7 @@ def blank(flat: Browser, running: RunningServer) -> Iterator[Page]:
 
 
 def run(page: Page, module: str, body: str, argument: Any = None) -> Any:
-    """What the body makes of the module `m` and the argument `a`."""
+    """Result of a script body with the module `m` and the argument `a`."""
     return page.evaluate(
         f"async (a) => {{ const m = await import('/static/js/{module}');"
         " const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));"
@@ -66,7 +66,7 @@ def test_a_batch_has_the_bytes_that_the_server_would_write(blank: Page, offsets:
     samples[3, 0, 0] = np.inf
     late = np.arange(5, dtype=np.uint32) * 10_007 if offsets else None
     batch = SampleBatch(3, 2**40 + 7, 1_795_000_000_123_456, 1_795_000_000_200_001, samples, late)
-    made = run(
+    result = run(
         blank,
         "common/wire.js",
         """return text(m.encodeBatch({ stream: 3, seq: 2 ** 40 + 7, t0Us: 1795000000123456, nImu: 7,
@@ -74,7 +74,7 @@ def test_a_batch_has_the_bytes_that_the_server_would_write(blank: Page, offsets:
           offsetsUs: a.offsets && Uint32Array.from(a.offsets) }));""",
         {"samples": b64(samples.tobytes()), "offsets": None if late is None else late.tolist()},
     )
-    assert base64.b64decode(made) == encode_batch(batch)
+    assert base64.b64decode(result) == encode_batch(batch)
 
 
 def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
@@ -93,20 +93,20 @@ def test_a_batch_of_the_server_is_read_back(blank: Page) -> None:
     }  # fmt: skip
     broken = bytearray(frame)
     broken[40] ^= 1
-    said = run(
+    result = run(
         blank,
         "common/wire.js",
         "try { m.decodeBatch(bytes(a)); return 'read'; } catch (e) { return e.message; }",
         b64(bytes(broken)),
     )
-    assert said == "a damaged batch"
+    assert result == "a damaged batch"
 
 
 def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
     rng = np.random.default_rng(4)
     samples = rng.normal(0, 5, (40, 5, 1, 9)).astype(np.float32)
     frames = [encode_batch(SampleBatch(0, n + 60, n * 50_000, n * 50_000, samples[n])) for n in range(40)]
-    made = run(
+    result = run(
         blank,
         "common/wire.js",
         "const { Sha256 } = await import('/static/js/common/sha256.js');"
@@ -116,7 +116,7 @@ def test_a_saved_rest_is_a_recording_that_the_server_reads(blank: Page) -> None:
         " return text(new Uint8Array(await new Blob(parts).arrayBuffer()));",
         {"hello": HELLO, "frames": [b64(f) for f in frames]},
     )
-    log = base64.b64decode(made)
+    log = base64.b64decode(result)
     assert b"secret" not in log
     recording = read_recording([SourceFile("rest.sagittal-live", len(log), lambda: log)], None)
     assert recording.notices == ()
@@ -138,7 +138,7 @@ def test_the_browsers_scan_of_a_log_stops_where_the_servers_does(blank: Page) ->
 def test_sha256_goes_on_from_a_saved_state(blank: Page) -> None:
     data = np.random.default_rng(1).bytes(10_000)
     for length in (0, 1, 55, 56, 63, 64, 65, 119, 128, 10_000):
-        found = run(
+        result = run(
             blank,
             "common/sha256.js",
             """const all = bytes(a); let hash = new m.Sha256(), step = 1;
@@ -149,7 +149,7 @@ def test_sha256_goes_on_from_a_saved_state(blank: Page) -> None:
             return hash.hex();""",
             b64(data[:length]),
         )
-        assert found == hashlib.sha256(data[:length]).hexdigest(), length
+        assert result == hashlib.sha256(data[:length]).hexdigest(), length
 
 
 def test_dot_payloads_decode_to_the_vectors(blank: Page) -> None:
@@ -174,7 +174,7 @@ def test_dot_payloads_decode_to_the_vectors(blank: Page) -> None:
 
 
 def test_dot_modes_have_the_sizes_of_the_specification_and_short_ones_are_refused(blank: Page) -> None:
-    found = run(
+    result = run(
         blank,
         "capture/sources/dot_payload.js",
         """const reads = (mode, n) => {
@@ -183,18 +183,18 @@ def test_dot_modes_have_the_sizes_of_the_specification_and_short_ones_are_refuse
         const size = (mode) => Array.from({ length: 70 }, (_, n) => n).find((n) => reads(mode, n));
         return Object.fromEntries([3, 5, 20, 21].map((mode) => [mode, size(mode)]));""",
     )
-    assert found == {"3": 32, "5": 20, "20": 34, "21": 28}
+    assert result == {"3": 32, "5": 20, "20": 34, "21": 28}
 
 
 def test_the_dot_clock_goes_on_over_its_wrap(blank: Page) -> None:
     steps = [2**32 - 20_000, 2**32 - 3_000, 13_667, 30_333]
-    found = run(
+    result = run(
         blank,
         "capture/sources/dot_payload.js",
         "const c = new m.Clock(); return a.map((t) => c.read(t));",
         steps,
     )
-    assert np.diff(found).tolist() == [17_000, 16_667, 16_666]
+    assert np.diff(result).tolist() == [17_000, 16_667, 16_666]
 
 
 READ = """const files = a.map(([name, content]) => new File([bytes(content)], name));
@@ -219,9 +219,9 @@ def _server_reading(files: list[tuple[str, bytes]]) -> Any:
 def test_xsens_text_is_read_as_the_server_reads_it(blank: Page) -> None:
     folder = data_folder("neura_walk", "rawimu")
     files = [(p.name, p.read_bytes()) for p in sorted(folder.glob("*.txt"))]
-    found = _read(blank, files)
-    assert {c["id"] for c in found["copies"]} == {"00B40C49", "00B40C4A"}
-    (track,) = found["tracks"]
+    result = _read(blank, files)
+    assert {c["id"] for c in result["copies"]} == {"00B40C49", "00B40C4A"}
+    (track,) = result["tracks"]
     assert track["rateHz"] == 100
     assert track["clock"] == "shared"
     assert len(track["ids"]) == 9
@@ -254,8 +254,8 @@ def test_sensors_that_start_and_end_apart_share_their_packet_counter_over_its_wr
     assert sorted(set(np.diff(t))) == [10_000, 20_000]
     assert np.isnan(_values(track, 1)[:4]).all()
     assert np.isnan(_values(track, 0)[-4:]).all()
-    both = ~np.isnan(_values(track, 0)[:, 0]) & ~np.isnan(_values(track, 1)[:, 0])
-    np.testing.assert_array_equal(_values(track, 0)[both, :6], _values(track, 1)[both, :6])
+    pair = ~np.isnan(_values(track, 0)[:, 0]) & ~np.isnan(_values(track, 1)[:, 0])
+    np.testing.assert_array_equal(_values(track, 0)[pair, :6], _values(track, 1)[pair, :6])
 
 
 def test_a_live_log_plays_with_its_segments_and_clocks(blank: Page) -> None:
@@ -265,9 +265,9 @@ def test_a_live_log_plays_with_its_segments_and_clocks(blank: Page) -> None:
     log = b"SAGLIVE1\n" + record("H", json.dumps(hello).encode())
     for n in range(4):
         log += record("B", encode_batch(SampleBatch(0, n, 5_000 + n * 50_000, n, samples[n * 5 : n * 5 + 5])))
-    found = _read(blank, [("x.sagittal-live", log)])
-    (track,) = found["tracks"]
-    assert found["segments"] == {"A1": "pelvis"}
+    result = _read(blank, [("x.sagittal-live", log)])
+    (track,) = result["tracks"]
+    assert result["segments"] == {"A1": "pelvis"}
     assert track["clock"] == "own"
     np.testing.assert_array_equal(_values(track, 0), samples[:, 0])
     np.testing.assert_array_equal(track["tUs"], 5_000 + 10_000 * np.arange(20))
@@ -297,15 +297,15 @@ def test_a_plain_table_of_ours_is_read(blank: Page) -> None:
 def test_a_file_that_cannot_be_played_is_refused_with_its_name(
     blank: Page, name: str, content: bytes, says: str
 ) -> None:
-    said = run(
+    result = run(
         blank,
         "capture/sources/files.js",
         "const file = new File([bytes(a.content)], a.name);"
         " return m.readFiles([file]).then(() => 'read', (e) => e.message);",
         {"name": name, "content": b64(content)},
     )
-    assert name in said
-    assert says in said
+    assert name in result
+    assert says in result
 
 
 @pytest.mark.parametrize(
@@ -323,9 +323,9 @@ def test_a_sensors_name_tells_its_segment(blank: Page, name: str, segment: str |
 def turned_device(
     order: str, sign: int, *, scale: float = 180 / np.pi, edge: float = 1.0
 ) -> list[list[float]]:
-    """Rows t, acc, rates of a device laid flat, on its left edge (−1: its right), upright and flat again.
+    """Rows (t, acc, rates) of a device laid flat, on its left edge (−1: right), upright and flat again.
 
-    Truth: x right, y up the screen, z out of it; specific force +g along the axis that points up.
+    Truth: x right, y up the screen, z out of it; specific force +g along the upward axis.
     """
     dt, g = 1 / 60, np.array([0.0, 0.0, 9.81])
     quarter = np.pi / 2
@@ -357,10 +357,10 @@ SELF_TEST = """const test = new m.AxesTest(); const poses = [];
 @pytest.mark.parametrize("order", ["xyz", "zxy", "yxz"])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_self_test_finds_axes_and_sign_from_gravity(blank: Page, order: str, sign: int) -> None:
-    found = run(blank, "capture/sources/axes.js", SELF_TEST, turned_device(order, sign))
-    assert found["problem"] is None
-    assert found["poses"] == [1, 2, 3, 4]
-    result = found["result"]
+    process = run(blank, "capture/sources/axes.js", SELF_TEST, turned_device(order, sign))
+    assert process["problem"] is None
+    assert process["poses"] == [1, 2, 3, 4]
+    result = process["result"]
     assert result["accSign"] == sign
     assert [order[i] for i in result["order"]] == ["x", "y", "z"]
     assert result["signs"] == [1, 1, 1]
@@ -389,12 +389,12 @@ def test_the_self_test_finds_rates_in_radians_and_a_turned_sign(blank: Page) -> 
 def test_the_self_test_refuses_what_gravity_contradicts(blank: Page, spoil: Any, says: str) -> None:
     rows = [spoil(row) for row in turned_device("xyz", 1)]
     body = SELF_TEST.replace("of a)", "of a.map((row) => row.map((v) => v ?? NaN)))")
-    found = run(blank, "capture/sources/axes.js", body, [[None if v != v else v for v in r] for r in rows])
-    assert found["result"] is None
-    assert says in found["problem"]
+    result = run(blank, "capture/sources/axes.js", body, [[None if v != v else v for v in r] for r in rows])
+    assert result["result"] is None
+    assert says in result["problem"]
 
 
 def test_the_self_test_refuses_the_wrong_edge(blank: Page) -> None:
-    found = run(blank, "capture/sources/axes.js", SELF_TEST, turned_device("xyz", 1, edge=-1.0))
-    assert found["result"] is None
-    assert "wrong way round" in found["problem"]
+    result = run(blank, "capture/sources/axes.js", SELF_TEST, turned_device("xyz", 1, edge=-1.0))
+    assert result["result"] is None
+    assert "wrong way round" in result["problem"]

@@ -1,4 +1,4 @@
-"""What the tablet keeps in IndexedDB, in real Chromium: over reloads, a crash, beyond what memory holds."""
+"""Batches in the tablet's IndexedDB, in Chromium: reloads, a crash, more data than memory."""
 
 from __future__ import annotations
 
@@ -47,17 +47,17 @@ def frame(n: int) -> bytes:
 
 
 def digest(count: int) -> str:
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for n in range(count):
-        found.update(payload_of(frame(n), read_batch_header(frame(n))))
-    return found.hexdigest()
+        sha256.update(payload_of(frame(n), read_batch_header(frame(n))))
+    return sha256.hexdigest()
 
 
 def test_more_than_memory_holds_is_read_back_in_order_with_its_hash(context: BrowserContext) -> None:
     page = opened(context)
     run(page, BEGIN + "for (let n = 0; n < 700; n++) outbox.add(batch(n), 100); await outbox.settled();")
     page.reload()
-    found = run(
+    result = run(
         page,
         AGAIN
         + """const all = [];
@@ -65,11 +65,11 @@ def test_more_than_memory_holds_is_read_back_in_order_with_its_hash(context: Bro
         return { all: all.map(text), made: outbox.made, stored: outbox.stored, acked: outbox.acked,
           held: outbox.heldS, sha: outbox.sha256(), last: outbox.record.lastUs[0] };""",
     )
-    assert [base64.b64decode(b) for b in found["all"]] == [frame(n) for n in range(700)]
-    assert (found["made"], found["stored"], found["acked"]) == (700, 700, 0)
-    assert found["held"] == pytest.approx(35)
-    assert found["sha"] == digest(700)
-    assert found["last"] == 699 * 50_000 + 40_000
+    assert [base64.b64decode(b) for b in result["all"]] == [frame(n) for n in range(700)]
+    assert (result["made"], result["stored"], result["acked"]) == (700, 700, 0)
+    assert result["held"] == pytest.approx(35)
+    assert result["sha"] == digest(700)
+    assert result["last"] == 699 * 50_000 + 40_000
 
 
 def test_acknowledged_batches_leave_the_tablet_and_the_hash_goes_on(context: BrowserContext) -> None:
@@ -80,7 +80,7 @@ def test_acknowledged_batches_leave_the_tablet_and_the_hash_goes_on(context: Bro
         " await outbox.settled(); await outbox.acknowledge(25);",
     )
     page.reload()
-    found = run(
+    result = run(
         page,
         AGAIN
         + """const acked = outbox.acked, first = (await outbox.read(25, 30)).map(text);
@@ -88,10 +88,10 @@ def test_acknowledged_batches_leave_the_tablet_and_the_hash_goes_on(context: Bro
         await outbox.settled(); await outbox.acknowledge(40);
         return { acked, first, sha: outbox.sha256(), left: (await outbox.read(0, 40)).length };""",
     )
-    assert found["acked"] == 25
-    assert [base64.b64decode(b) for b in found["first"]] == [frame(n) for n in range(25, 30)]
-    assert found["sha"] == digest(40)
-    assert found["left"] == 0
+    assert result["acked"] == 25
+    assert [base64.b64decode(b) for b in result["first"]] == [frame(n) for n in range(25, 30)]
+    assert result["sha"] == digest(40)
+    assert result["left"] == 0
     page.reload()
     assert run(page, AGAIN + "return [outbox.made, outbox.acked];") == [40, 40]
 
@@ -110,14 +110,14 @@ def test_what_was_stored_survives_a_crash_of_the_page(context: BrowserContext) -
         page.wait_for_timeout(50)
     with page.expect_event("crash"), contextlib.suppress(Error):
         page.goto("chrome://crash")
-    again = opened(context)
-    found = run(
-        again,
+    second_page = opened(context)
+    result = run(
+        second_page,
         AGAIN + "return [outbox.made, outbox.sha256(), (await outbox.read(0, outbox.made)).length];",
     )
-    assert found[0] >= stored[-1] >= 60
-    assert found[1] == digest(found[0])
-    assert found[2] == found[0]
+    assert result[0] >= stored[-1] >= 60
+    assert result[1] == digest(result[0])
+    assert result[2] == result[0]
 
 
 def test_a_finished_take_leaves_nothing_behind(context: BrowserContext) -> None:

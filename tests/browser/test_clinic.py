@@ -1,4 +1,4 @@
-"""What people do around a recording: sign in and out, add, rename and delete, run again, stop, be refused."""
+"""Everyday tasks: sign in and out, add, rename and delete, repeat an analysis, stop, refusals."""
 
 from __future__ import annotations
 
@@ -102,9 +102,9 @@ def test_another_mapping_runs_the_analysis_again(
     expect(page.get_by_role("heading", name="Earlier analyses")).to_be_visible()
     terms = page.locator("section:has(#h-sens) dt").all_inner_texts()
     values = page.locator("section:has(#h-sens) dd").all_inner_texts()
-    shown = dict(zip(terms, values, strict=True))
+    visible_mapping = dict(zip(terms, values, strict=True))
     left_foot = next(d for d, s in sensors.items() if s == "foot_l")
-    assert shown[left_foot] == "Left foot"
+    assert visible_mapping[left_foot] == "Left foot"
 
 
 def test_a_waiting_job_is_shown_live_and_can_be_cancelled(

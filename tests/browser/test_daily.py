@@ -28,8 +28,8 @@ LIVED = (
 @keep
 def lived_files() -> tuple[dict[str, bytes], dict[str, str | None]]:
     """Five minutes with one sensor on the chest."""
-    made = simulate_day(LIVED, setup=RecordingSetup(rate_hz=50.0))
-    return dict(mt_files(made.recording, "day")), dict(made.recording.segments)
+    day = simulate_day(LIVED, setup=RecordingSetup(rate_hz=50.0))
+    return dict(mt_files(day.recording, "day")), dict(day.recording.segments)
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""What is pressed on a slow device before the scripts of a page are there is done once they are."""
+"""Clicks before the scripts of a page are loaded are replayed afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What estimated the poses is named, its health shown, another one can be run; what a tape measure adds."""
+"""Estimator name and health, another estimator on request, and measured lengths."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("unknown_sensors")
 
 @pytest.fixture(scope="module")
 def walk(running: RunningServer, filled: Filled) -> str:
-    """An analysed session of its own."""
+    """Separate analysed session."""
     files, sensors = filling.simulated_files()
     with running.client() as client:
         patient = filling.add(client, "/patients", code="ESTIMATED", height_m=1.75)["id"]
@@ -26,7 +26,7 @@ def walk(running: RunningServer, filled: Filled) -> str:
 
 
 def find_row(page: Page, name: str) -> Locator:
-    """The row of a value behind the first ten, found by its name."""
+    """Row of a parameter outside the first ten, by its name."""
     page.get_by_label("Find a value").fill(name)
     return page.locator("all-values tbody tr", has_text=name)
 
@@ -113,8 +113,8 @@ def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     clearance = find_row(page, "Toe clearance")
     expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^\s*−?0\.\d+(\s*± [\d.]+)?\s*$"))
     with running.client() as client:
-        said = client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
-    assert said["standing_angles_deg"] == {"knee_flexion_l": 8, "knee_flexion_r": -2}
+        body = client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
+    assert body["standing_angles_deg"] == {"knee_flexion_l": 8, "knee_flexion_r": -2}
     page.goto(f"/sessions/{walk}/upload")
     page.get_by_text("Sole of the shoe by tape").click()
     page.get_by_label("To the rear end").fill("")

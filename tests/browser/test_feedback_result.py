@@ -40,14 +40,14 @@ def trained(running: RunningServer) -> str:
     reviewed = ReviewedAnalyses(blobs)
     with closing(Database(running.folder / "sagittal.db")) as db:
         with db.read() as c:
-            found = analyses.get_shown(c, session)
-            edits = edit_log.edits_of(c, found.id)
-            given = prescriptions.for_take(c, reviewed, session)
-        assert given is not None
-        engine = FeedbackEngine(*given)
-        lengths = reviewed.read_columns(found, edits)["step_length_m"]
-        strides = reviewed.read_bundle(found, edits).strides.strides
-        told = [
+            analysis = analyses.get_shown(c, session)
+            edits = edit_log.edits_of(c, analysis.id)
+            inputs = prescriptions.for_take(c, reviewed, session)
+        assert inputs is not None
+        engine = FeedbackEngine(*inputs)
+        lengths = reviewed.read_columns(analysis, edits)["step_length_m"]
+        strides = reviewed.read_bundle(analysis, edits).strides.strides
+        frames = [
             engine.push(
                 Walked(
                     n, s.side, s.start_s, s.end_s, s.end_s, {"step_length_m": length}, {},
@@ -56,8 +56,8 @@ def trained(running: RunningServer) -> str:
             )
             for n, (s, length) in enumerate(zip(strides, lengths, strict=True))
         ]  # fmt: skip
-        cues = [cue for cue in told if cue is not None]
-        ended_take(db, blobs, session, cues, found.recording_id)
+        cues = [cue for cue in frames if cue is not None]
+        ended_take(db, blobs, session, cues, analysis.recording_id)
     return session
 
 

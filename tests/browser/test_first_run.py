@@ -40,9 +40,9 @@ def _printed(log: Path) -> str:
     """The set-up address; printed once requests are answered."""
     end = time.monotonic() + 20
     while time.monotonic() < end:
-        found = re.search(r"http://\S+/set-up/\S+", log.read_text())
-        if found:
-            assert httpx.get(found[0]).is_success
-            return found[0]
+        match = re.search(r"http://\S+/set-up/\S+", log.read_text())
+        if match:
+            assert httpx.get(match[0]).is_success
+            return match[0]
         time.sleep(0.1)
     raise AssertionError(f"no set-up address in:\n{log.read_text()}")

@@ -56,11 +56,11 @@ def test_a_page_is_german_and_keeps_to_the_design(name: str, opened: Opener, fil
 def test_scripts_say_in_german_who_a_norm_is_of(opened: Opener, filled: Filled) -> None:
     """A target of a prescription: the pattern of a group and its source took their number for the group."""
     page = opened(PAGES["prescription"](filled), locale="de-DE")
-    said = page.evaluate(
+    evaluation = page.evaluate(
         "async (text) => (await import('/static/js/common/words.js')).translate(text)",
         "healthy adults asked to walk at this speed, n = 52 (Schreiber & Moissenet 2019 (Sci Data 6:111))",
     )
-    assert said == (
+    assert evaluation == (
         "gesunde Erwachsene, die in diesem Tempo gehen sollten, n = 52 "
         "(Schreiber & Moissenet 2019 (Sci Data 6:111))"
     )
@@ -84,21 +84,21 @@ def test_the_check_can_fail(opened: Opener) -> None:
 def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
     page = opened("/capture", signed_in=False, locale="de-DE")
     page.get_by_role("button", name="Code eingeben").wait_for()
-    said = page.evaluate(
+    evaluation = page.evaluate(
         """async () => {
           const { fixed, speak, translate } = await import("/static/js/common/words.js");
           const rest = speak`${fixed(1.25, 2)} s are still on this tablet only.`;
           return [rest, translate("Stand still."), speak`Stop`];
         }"""
     )
-    assert said == ["1,25 s sind noch allein auf diesem Tablet.", "Stehen Sie still.", "Stopp"]
+    assert evaluation == ["1,25 s sind noch allein auf diesem Tablet.", "Stehen Sie still.", "Stopp"]
 
 
 @pytest.mark.parametrize("typed", ["Sensor 2.csv", "Pain, left knee", "Training 2.5", "2.5", "Stop"])
 def test_scripts_show_what_people_typed_as_it_is(typed: str, opened: Opener) -> None:
     page = opened("/capture", signed_in=False, locale="de-DE")
     page.get_by_role("button", name="Code eingeben").wait_for()
-    said = page.evaluate(
+    evaluation = page.evaluate(
         """async (typed) => {
           const { speak, translate } = await import("/static/js/common/words.js");
           const refused = `The code '${typed}' belongs to another patient; choose a new one.`;
@@ -106,9 +106,9 @@ def test_scripts_show_what_people_typed_as_it_is(typed: str, opened: Opener) -> 
         }""",
         typed,
     )
-    assert said[0] == f"{typed} wird hochgeladen …"
-    assert said[1] == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
-    assert f"„{typed}“" in said[2]
+    assert evaluation[0] == f"{typed} wird hochgeladen …"
+    assert evaluation[1] == f"Das Kürzel „{typed}“ gehört einem anderen Patienten; wählen Sie ein neues."
+    assert f"„{typed}“" in evaluation[2]
 
 
 @pytest.mark.journey

@@ -1,4 +1,4 @@
-"""A guided timed up and go from pairing to the session page: streamed as by a tablet, timed by itself."""
+"""Guided timed up and go from pairing to the session page, streamed as by a tablet."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ SITS_ON_S = 60.0
 
 @keep
 def up_and_go() -> ChairSimulation:
-    """A simulated test with one sensor on the pelvis, and a long sitting behind it."""
-    made = simulate_tug("healthy", 1, setup=replace(ON_SKIN, worn=("pelvis",)))
-    streams = {device: _held(x) for device, x in made.recording.streams.items()}
-    return replace(made, recording=replace(made.recording, streams=streams))
+    """Simulated test with one pelvis sensor, followed by long sitting."""
+    simulation = simulate_tug("healthy", 1, setup=replace(ON_SKIN, worn=("pelvis",)))
+    streams = {device: _held(x) for device, x in simulation.recording.streams.items()}
+    return replace(simulation, recording=replace(simulation.recording, streams=streams))
 
 
 def _held(x: ImuStream) -> ImuStream:
@@ -44,11 +44,11 @@ def _held(x: ImuStream) -> ImuStream:
 
 @contextmanager
 def somebody_who_does_it(running: RunningServer) -> Iterator[str]:
-    """The session of somebody who does the test from now on."""
+    """Session of a person who performs the test."""
     take = up_and_go().recording
     with running.client() as client:
-        who = {"code": f"TUG-{uuid4().hex[:4]}", "sex": "female", "birth_year": 1958, "height_m": 1.65}
-        patient = filling.add(client, "/patients", **who)
+        user = {"code": f"TUG-{uuid4().hex[:4]}", "sex": "female", "birth_year": 1958, "height_m": 1.65}
+        patient = filling.add(client, "/patients", **user)
         session = filling.add_session(client, patient["id"], "Up and go", protocol="tug")
         code = filling.add(client, f"/sessions/{session}/live")["code"]
         stream = threading.Thread(target=lambda: asyncio.run(demo_live.stream_walk(running.url, code, take)))
@@ -103,5 +103,5 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
         expect(card.locator(".kpi .v").first).to_contain_text(f"{total + 0.5:.1f}", timeout=90_000)
         with running.client() as client:
             events = client.get(f"/api/v1/sessions/{session}/live/events").json()
-        said = [e["content"]["value"] for e in events if e["kind"] == "test"]
-        assert said[-1]["start_s"] == pytest.approx(start - 0.5, abs=0.01)
+        values = [e["content"]["value"] for e in events if e["kind"] == "test"]
+        assert values[-1]["start_s"] == pytest.approx(start - 0.5, abs=0.01)

@@ -39,14 +39,14 @@ def test_every_focus_is_seen(opened: Opener, filled: Filled) -> None:
     unseen = []
     for _ in range(40):
         page.keyboard.press("Tab")
-        seen = page.evaluate(
+        evaluation = page.evaluate(
             """() => { const e = document.activeElement; if (e === document.body) return null;
             const s = getComputedStyle(e), hit = e.querySelector('.hit');
             const mark = s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2;
             const ring = hit && parseFloat(getComputedStyle(hit).strokeWidth) >= 2;
             return mark || ring ? '' : e.outerHTML.slice(0, 120); }"""
         )
-        unseen += [seen] if seen else []
+        unseen += [evaluation] if evaluation else []
     assert not unseen, unseen
 
 
@@ -77,13 +77,13 @@ def test_a_sensor_is_placed_with_keys(opened: Opener, filled: Filled) -> None:
 
 def test_swapping_left_and_right_swaps_every_leg_sensor(opened: Opener, filled: Filled) -> None:
     page = opened(f"/sessions/{filled.unmapped}/upload", stays=True)
-    before = _segments(page)
+    initial = _segments(page)
     page.locator("[data-swap]").focus()
     page.keyboard.press("Enter")
     turn = {"l": "r", "r": "l"}
-    expected = [s[:-1] + turn[s[-1]] if s[-2:] in {"_l", "_r"} else s for s in before]
+    expected = [s[:-1] + turn[s[-1]] if s[-2:] in {"_l", "_r"} else s for s in initial]
     assert _segments(page) == expected
-    assert expected != before
+    assert expected != initial
 
 
 def test_two_sensors_on_one_segment_cannot_be_analysed(opened: Opener, filled: Filled) -> None:
@@ -130,8 +130,8 @@ def test_pointing_at_a_curve_moves_the_cursor_of_all_charts(opened: Opener, fill
     box = plot.bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 20)
-    (at,) = _cursors(page)
-    assert abs(at - 600) < 10
+    (position,) = _cursors(page)
+    assert abs(position - 600) < 10
 
 
 def _segments(page: Page) -> list[str]:
@@ -140,12 +140,12 @@ def _segments(page: Page) -> list[str]:
 
 def _cursors(page: Page) -> set[float]:
     """Positions of all visible cursors, 0 to 1000 over the cycle."""
-    found: list[float] = page.evaluate(
+    values: list[float] = page.evaluate(
         "[...document.querySelectorAll('[data-chart] .cursor:not([hidden])')]"
         ".map((e) => Math.round(10 * Number(e.getAttribute('x1'))) / 10)"
     )
-    assert len(found) >= 8
-    return set(found)
+    assert len(values) >= 8
+    return set(values)
 
 
 def _tab_to(page: Page, text: str) -> None:

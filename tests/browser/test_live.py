@@ -38,15 +38,15 @@ HEAD, WALK, STAND = 6, 1120, 2075
 
 def longer(files: list[tuple[str, bytes]]) -> list[tuple[str, bytes]]:
     """The same with the walk three times over: after calibration the real one has three strides left."""
-    made = []
+    result = []
     for name, content in files:
         lines = content.decode().splitlines(keepends=True)
         rows = [line.split(",", 1) for line in lines[HEAD:]]
         first = int(rows[0][0])
         order = [*rows[:STAND], *rows[WALK:STAND], *rows[WALK:STAND], *rows[STAND:]]
-        told = (f"{first + i},{rest}" for i, (_, rest) in enumerate(order))
-        made.append((name, "".join([*lines[:HEAD], *told]).encode()))
-    return made
+        notices = (f"{first + i},{remainder}" for i, (_, remainder) in enumerate(order))
+        result.append((name, "".join([*lines[:HEAD], *notices]).encode()))
+    return result
 
 
 WATCH = """() => {
@@ -99,11 +99,11 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         expect(page.locator("[data-waiting]")).to_contain_text("The tablet is paired")
         choose(device, longer(walk_files()))
         place(device, SEGMENTS)
-        seen: dict[str, list[str]] = defaultdict(list)
-        page.expose_function("note", lambda key, value: seen[key].append(value))
+        observations: dict[str, list[str]] = defaultdict(list)
+        page.expose_function("note", lambda key, value: observations[key].append(value))
         page.evaluate(WATCH)
         screen = opened(f"{urlsplit(page.url).path}/patient")
-        screen.expose_function("note", lambda key, value: seen[key].append(value))
+        screen.expose_function("note", lambda key, value: observations[key].append(value))
         screen.evaluate(WATCH)
         screen.get_by_role("button", name="With sound").click()
         start(device)
@@ -131,15 +131,17 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         page.keyboard.press("Enter")
         expect(screen.locator("[data-pause-title]")).to_have_text("Well done", timeout=60_000)
         expect(device.locator("[data-done]")).to_have_text("Recording is on the server", timeout=30_000)
-    assert len(set(seen["chart"])) > 3, "the chart stands still"
-    assert len(set(seen["value"])) > 2
-    assert len(set(seen["message"])) > 1, "feedback does not change with the stride"
-    assert any("“looked up”" in text for text in seen["mark"])
-    assert re.match(r"\d+ of \d+ in zone", seen["zone"][-1])
+    assert len(set(observations["chart"])) > 3, "the chart stands still"
+    assert len(set(observations["value"])) > 2
+    assert len(set(observations["message"])) > 1, "feedback does not change with the stride"
+    assert any("“looked up”" in text for text in observations["mark"])
+    assert re.match(r"\d+ of \d+ in zone", observations["zone"][-1])
 
     # the end: saved, analysed, opened
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=60_000)
-    assert set(seen["over"]) <= {"Recording saved"}  # it may be analysed before anybody could read that
+    assert set(observations["over"]) <= {
+        "Recording saved"
+    }  # it may be analysed before anybody could read that
     expect(page.get_by_role("heading", name="Key values")).to_be_visible(timeout=30_000)
     with running.client() as client:
         session = page.url.rsplit("/", 1)[1]
@@ -147,8 +149,8 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         events = client.get(f"/api/v1/sessions/{session}/live/events").json()
     assert (take["state"], take["problem"]) == ("finished", None)
     assert {"cue", "mark", "calibration"} <= {e["kind"] for e in events}
-    shown = [e["content"] for e in events if e["kind"] == "cue" and e["content"]["shown"]]
-    assert len({c["zone"] for c in shown}) > 1
+    visible_contents = [e["content"] for e in events if e["kind"] == "cue" and e["content"]["shown"]]
+    assert len({c["zone"] for c in visible_contents}) > 1
 
 
 def test_the_figure_walks_and_stop_ends_the_take(
@@ -158,8 +160,8 @@ def test_the_figure_walks_and_stop_ends_the_take(
         page = opened(f"/sessions/{session}/live", browser=solid)
         until_strides(page, 2)
         page.get_by_role("button", name="Norm").dispatch_event("click")
-        before = wait_for_picture(page, lambda now: min(now["orange"], now["blue"]) > 150)
-        after = wait_for_picture(page, lambda now: now != before and min(now["orange"], now["blue"]) > 150)
-        assert after != before, "the figure stands still"
+        initial = wait_for_picture(page, lambda now: min(now["orange"], now["blue"]) > 150)
+        final = wait_for_picture(page, lambda now: now != initial and min(now["orange"], now["blue"]) > 150)
+        assert final != initial, "the figure stands still"
         page.get_by_role("button", name="STOP").click()
         page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=90_000)

@@ -1,4 +1,4 @@
-"""The live pages told by a feed: states, charts, words, sound; what of them depends on no sensor."""
+"""Live pages driven by a simulated feed: states, charts, texts, sound."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ PIXELS = """([tag, token]) => {
 @pytest.fixture(scope="module")
 def trained(running: RunningServer) -> tuple[str, str, str]:
     """Sessions: step length with bar and sound; the same as a path, right; nothing prescribed."""
-    made = []
+    result = []
     with running.client() as client:
         for code, side, modes in (
             ("P-0060", "left", ["bar", "tone", "tick"]),
@@ -69,8 +69,8 @@ def trained(running: RunningServer) -> tuple[str, str, str]:
             ]
             if modes is not None:
                 prescribe(client, patient, side=side, modes=modes)
-            made.append(filling.add_session(client, patient, "Training 10"))
-    return made[0], made[1], made[2]
+            result.append(filling.add_session(client, patient, "Training 10"))
+    return result[0], result[1], result[2]
 
 
 def prescribe(client: httpx.Client, patient_id: str, **changed: Any) -> None:
@@ -86,7 +86,7 @@ def prescribe(client: httpx.Client, patient_id: str, **changed: Any) -> None:
 
 @pytest.fixture
 def told(flat: Browser, kept: KeptContexts) -> Opener:
-    """Opens a page whose feed the test speaks."""
+    """Open a page whose feed the test controls."""
 
     def open_(
         path: str, *, width: int = 1280, height: int = 800, scheme: str = "light", locale: str = "en-US"
@@ -132,20 +132,20 @@ def test_the_current_stride_grows_without_a_norm_of_another_zero_and_follows_the
     assert drawn[-1] > drawn[0]
     assert page.evaluate(PIXELS, ["stride-chart", "norm"]) < 100, "what starts from standing has no band"
     drawing = "() => document.querySelector('stride-chart canvas').toDataURL()"
-    before = page.evaluate(drawing)
+    initial_evaluation = page.evaluate(drawing)
     page.get_by_role("button", name="Hip").click()
     page.wait_for_timeout(150)
-    assert page.evaluate(drawing) != before
+    assert page.evaluate(drawing) != initial_evaluation
     expect(page.locator("[data-variable]")).to_have_text("Hip flexion, from standing")
 
 
 def test_charts_follow_the_theme(told: Opener, trained: tuple[str, str, str]) -> None:
     page = _therapist(told, trained[0])
-    drawn, of = f"(of) => ({PIXELS.strip()})(of) > 100", ["stride-chart", "left"]
-    page.wait_for_function(drawn, arg=of)
+    drawn, source = f"(of) => ({PIXELS.strip()})(of) > 100", ["stride-chart", "left"]
+    page.wait_for_function(drawn, arg=source)
     page.emulate_media(color_scheme="dark")
-    page.wait_for_function(drawn, arg=of)
-    assert page.evaluate(PIXELS, of) > 100
+    page.wait_for_function(drawn, arg=source)
+    assert page.evaluate(PIXELS, source) > 100
 
 
 def test_left_against_right_is_said_of_four_strides_that_tell_them_apart_only(
@@ -200,12 +200,12 @@ def test_a_page_opened_after_stop_and_one_whose_stop_was_refused_say_what_is(
     this.say(feed.state(stopping=True), feed.feedback(), feed.frame(100.0))
     expect(this.page.locator("[data-cover]")).to_contain_text("Stopping… saving")
     this.page.close()
-    other = told(f"/sessions/{trained[0]}/live")
-    other.walk([0.53], ["in"])
-    other.page.get_by_role("button", name="STOP").click()  # the server knows of no take here
-    expect(other.page.locator("[data-note=problem]")).to_be_visible()
-    expect(other.page.locator("[data-rec]")).to_contain_text("Recording")
-    expect(other.page.locator("[data-cover]")).not_to_contain_text("Stopping")
+    second = told(f"/sessions/{trained[0]}/live")
+    second.walk([0.53], ["in"])
+    second.page.get_by_role("button", name="STOP").click()  # the server knows of no take here
+    expect(second.page.locator("[data-note=problem]")).to_be_visible()
+    expect(second.page.locator("[data-rec]")).to_contain_text("Recording")
+    expect(second.page.locator("[data-cover]")).not_to_contain_text("Stopping")
 
 
 @pytest.mark.parametrize("size", [(820, 1180), (768, 1024), (701, 1000), (390, 844)])
@@ -301,12 +301,12 @@ def test_a_code_is_shown_in_two_groups_and_a_second_page_asks_for_a_new_one(
     expect(page.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
     expect(page.locator("[data-code-left]")).to_have_text(re.compile("Valid for 09:"))
     first = page.locator("[data-code]").text_content()
-    other = context.new_page()
-    other.goto(f"/sessions/{session}/live")
-    expect(other.locator("[data-code-left]")).to_contain_text("Ask for a new one")
-    other.get_by_role("button", name="New code").click()
-    expect(other.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
-    assert other.locator("[data-code]").text_content() != first
+    other_other_page = context.new_page()
+    other_other_page.goto(f"/sessions/{session}/live")
+    expect(other_other_page.locator("[data-code-left]")).to_contain_text("Ask for a new one")
+    other_other_page.get_by_role("button", name="New code").click()
+    expect(other_other_page.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
+    assert other_other_page.locator("[data-code]").text_content() != first
     context.close()
 
 
@@ -463,7 +463,7 @@ def test_a_running_take_is_german(told: Opener, trained: tuple[str, str, str]) -
 
 def _faults_everywhere(this: Told, stage: Stage | None = None) -> dict[str, Any]:
     """Faults of a state in every size, light and dark; a new frame each time keeps a stage from going old."""
-    found: dict[str, Any] = {}
+    fields: dict[str, Any] = {}
     for width, height in SIZES:
         this.page.set_viewport_size({"width": width, "height": height})
         for scheme in ("light", "dark"):
@@ -473,37 +473,37 @@ def _faults_everywhere(this: Told, stage: Stage | None = None) -> dict[str, Any]
             else:
                 this.say_fresh(stage=stage)
             faults = {**layout_faults(this.page), **text_faults(this.page)}
-            found |= {f"{width} {scheme}": faults} if faults else {}
-    return found
+            fields |= {f"{width} {scheme}": faults} if faults else {}
+    return fields
 
 
-def _therapist(told: Opener, session: str) -> Page:
-    this = told(f"/sessions/{session}/live")
+def _therapist(notices: Opener, session: str) -> Page:
+    this = notices(f"/sessions/{session}/live")
     this.walk([0.53, 0.45, 0.52, 0.495], ["in", "low", "in", "near_low"])
     return this.page
 
 
-def _patient(told: Opener, session: str, *, sound: bool = False, **size: Any) -> Told:
-    this = told(f"/sessions/{session}/live/patient", **size)
+def _patient(notices: Opener, session: str, *, sound: bool = False, **size: Any) -> Told:
+    this = notices(f"/sessions/{session}/live/patient", **size)
     this.page.get_by_role("button", name="With sound" if sound else "Without sound").click()
     this.say(feed.state(), feed.feedback(), feed.frame(100.0, contact="r"))
     return this
 
 
 @contextmanager
-def _seen(place: Locator, what: str, wanted: Any) -> Iterator[None]:
-    """What happens within makes `what` of the place as wanted, if only for a moment: it may soon be old.
+def _seen(place: Locator, what: str, expected: Any) -> Iterator[None]:
+    """Assert that an element's value matched at least once while the block ran.
 
     Parameters
     ----------
-    what : JavaScript, the element → what is compared.
+    what : JavaScript from the element to the compared value.
     """
     place.evaluate(
         f"""(e) => {{ window.seen = []; new MutationObserver(() => seen.push(({what})(e)))
           .observe(e, {{attributes: true, childList: true, characterData: true, subtree: true}}); }}"""
     )
     yield
-    place.page.wait_for_function("wanted => seen.includes(wanted)", arg=wanted)
+    place.page.wait_for_function("wanted => seen.includes(wanted)", arg=expected)
 
 
 def _until(done: Callable[[], bool], page: Page) -> None:
@@ -534,9 +534,9 @@ def test_a_test_whose_estimate_has_ended_shows_no_running_clock_and_nothing_to_b
     expect(test.locator("[data-say]")).to_contain_text("measured afterwards")
     expect(test.get_by_role("button", name="Start over")).to_be_hidden()
     expect(test.locator("[data-clock]")).to_have_css("text-decoration-line", "line-through")
-    shown = test.locator("[data-clock]").inner_text()
+    visible_text = test.locator("[data-clock]").inner_text()
     expect(page.locator("[data-note=estimate]")).to_contain_text("The live view has stopped.")
     page.wait_for_timeout(13_000)  # longer than a notice stays
     this.say(feed.state(estimate="failed"))
     expect(page.locator("[data-note=estimate]")).to_be_visible()
-    expect(test.locator("[data-clock]")).to_have_text(shown)
+    expect(test.locator("[data-clock]")).to_have_text(visible_text)

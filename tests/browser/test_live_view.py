@@ -23,27 +23,27 @@ def test_the_figure_is_loaded_again_when_the_line_comes_back_and_when_the_theme_
     context = flat.new_context(base_url=running.url, color_scheme="light")
     context.add_cookies(cookies)  # type: ignore[arg-type]
     page = context.new_page()
-    asked: list[str] = []
-    page.on("request", lambda r: asked.append(r.url) if "/live/figure" in r.url else None)
+    requested_names: list[str] = []
+    page.on("request", lambda r: requested_names.append(r.url) if "/live/figure" in r.url else None)
     this = Told.of(page)
     page.goto(f"/sessions/{session}/live")
     _until(page, lambda: bool(this.routes))
-    assert asked == []  # the figure is not to be seen yet
+    assert requested_names == []  # the figure is not to be seen yet
     this.walk([0.53], ["in"])
     view, frame = page.locator("live-view"), page.locator("live-view iframe")
     expect(view).to_have_attribute("data-state", "open", timeout=LOADS_MS)
     light = frame.get_attribute("src")
-    assert [url.endswith("dark=false") for url in asked] == [True]
+    assert [url.endswith("dark=false") for url in requested_names] == [True]
 
     this.routes[-1].close()
-    _until(page, lambda: len(asked) == 2)
+    _until(page, lambda: len(requested_names) == 2)
     expect(view).to_have_attribute("data-state", "open", timeout=LOADS_MS)
     assert frame.get_attribute("src") == light  # the same view, loaded anew
 
     page.evaluate("() => { document.documentElement.dataset.theme = 'dark'; }")
-    _until(page, lambda: len(asked) == 3)
+    _until(page, lambda: len(requested_names) == 3)
     expect(view).to_have_attribute("data-state", "open", timeout=LOADS_MS)
-    assert asked[-1].endswith("dark=true")
+    assert requested_names[-1].endswith("dark=true")
     assert frame.get_attribute("src") != light
     context.close()
 

@@ -115,8 +115,8 @@ def test_dialogs_obey_the_design_system(opened: Opener, filled: Filled) -> None:
         for width, height in (DESK, PHONE):
             page.set_viewport_size({"width": width, "height": height})
             page.locator(f"[commandfor={button}]").click()
-            found = layout_faults(page) | text_faults(page)
-            assert not found, f"{button} {width}: {found}"
+            result = layout_faults(page) | text_faults(page)
+            assert not result, f"{button} {width}: {result}"
             box = page.locator("dialog[open]").bounding_box()
             assert box is not None
             assert box["x"] >= 0

@@ -19,15 +19,15 @@ def test_the_figure_walks_without_a_server(solid: Browser, tmp_path: Path) -> No
     context = solid.new_context(offline=True, viewport={"width": 320, "height": 480})
     try:
         page = context.new_page()
-        asked: list[str] = []
-        page.on("request", lambda r: asked.append(r.url))
+        requested_names: list[str] = []
+        page.on("request", lambda r: requested_names.append(r.url))
         page.goto(file.as_uri())
         end = time.monotonic() + PATIENCE_S
-        found = {"orange": 0.0, "blue": 0.0}
-        while min(found["orange"], found["blue"]) < 100 and time.monotonic() < end:
-            found = page.evaluate(COUNT, base64.b64encode(page.screenshot()).decode())
-        assert min(found["orange"], found["blue"]) >= 100, found
-        assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+        evaluation = {"orange": 0.0, "blue": 0.0}
+        while min(evaluation["orange"], evaluation["blue"]) < 100 and time.monotonic() < end:
+            evaluation = page.evaluate(COUNT, base64.b64encode(page.screenshot()).decode())
+        assert min(evaluation["orange"], evaluation["blue"]) >= 100, evaluation
+        assert [url for url in requested_names if not url.startswith(("file:", "data:", "blob:"))] == []
         assert page.title() == "Sagittal"
     finally:
         context.close()

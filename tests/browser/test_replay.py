@@ -29,7 +29,7 @@ from tests.server.viewer.seeing import pixels_of, shot
 def figure_page(
     solid: Browser, running: RunningServer, cookies: list[dict[str, str]], filled: Filled
 ) -> Iterator[Page]:
-    """A session opened once, for software takes seconds until its figure stands."""
+    """Session page with a loaded 3D view, shared because software rendering takes seconds."""
     context = solid.new_context(base_url=running.url, viewport=DESK)
     context.add_cookies(cookies)  # type: ignore[arg-type]
     context.add_init_script(PACED)
@@ -43,7 +43,7 @@ def figure_page(
 
 @pytest.fixture
 def figure(figure_page: Page) -> Iterator[Page]:
-    """The same for one test, which leaves it as it was opened."""
+    """The shared page for one test, reset afterwards."""
     yield figure_page
     switched = figure_page.locator("[data-switch][aria-pressed=false]")
     while switched.count():
@@ -56,16 +56,16 @@ def figure(figure_page: Page) -> Iterator[Page]:
 
 @pytest.mark.journey
 def test_the_figure_has_two_legs_and_follows_the_clock(figure: Page) -> None:
-    before = wait_until_still(figure)
-    assert before["orange"] > 200
-    assert before["blue"] > 200
+    initial = wait_until_still(figure)
+    assert initial["orange"] > 200
+    assert initial["blue"] > 200
     figure.keyboard.press("j")
     figure.wait_for_function(
         "() => Math.abs(document.querySelector('gait-view').dataset.shown"
         " - document.querySelector('time-bar input').value) < 0.05"
     )
-    after = wait_for_picture(figure, lambda now: now != before)
-    assert after["orange"] > 100, "the figure is gone"
+    final = wait_for_picture(figure, lambda now: now != initial)
+    assert final["orange"] > 100, "the figure is gone"
 
 
 def test_a_session_loads_little_the_first_time_and_next_to_nothing_again(
@@ -95,12 +95,12 @@ def test_a_session_loads_little_the_first_time_and_next_to_nothing_again(
     assert folds["y"] <= 2 * 800, "what stands in front of the folds is longer than two screens"
     page.reload()
     _wait_until_drawn(page)
-    again = page.evaluate(
+    second_evaluation = page.evaluate(
         "() => performance.getEntriesByType('resource').filter((e) => e.initiatorType === 'iframe')"
         ".map((e) => e.transferSize)"
     )
-    assert len(again) == 1
-    assert again[0] < 2_000, "a browser keeps viser's page"
+    assert len(second_evaluation) == 1
+    assert second_evaluation[0] < 2_000, "a browser keeps viser's page"
     context.close()
 
 
@@ -119,9 +119,9 @@ def test_the_first_picture_gives_way_to_the_figure_without_a_jump(
     held[0].continue_()
     page.locator("gait-view[data-drawn]").wait_for()
     expect(view.get_by_role("img")).to_have_count(0)
-    shown = shot(view)
+    visible_rows = shot(view)
     for side in SIDES:
-        first, then = (pixels_of(picture, TINTS[False][side]) for picture in (drawn, shown))
+        first, then = (pixels_of(picture, TINTS[False][side]) for picture in (drawn, visible_rows))
         assert (first & then).sum() > 0.7 * max(first.sum(), then.sum()), side
 
 
@@ -133,8 +133,8 @@ def test_a_lost_line_comes_back_by_itself_and_keeps_what_was_switched(figure: Pa
         figure.evaluate("document.querySelector('gait-view').socket.close()")
         expect(view).to_have_attribute("data-state", "lost")
         expect(view).to_have_attribute("data-state", "open", timeout=10_000)
-        found = wait_for_picture(figure, lambda now: now["orange"] > least)  # noqa: B023 - called at once
-        assert found["blue"] > least
+        result = wait_for_picture(figure, lambda now: now["orange"] > least)  # noqa: B023 - called at once
+        assert result["blue"] > least
     expect(figure.locator("[data-switch=follow]")).to_have_attribute("aria-pressed", "false")
 
 
@@ -164,10 +164,10 @@ def test_from_where_the_view_stands_still_the_walk_goes_on(figure: Page) -> None
 
 def test_steps_and_trails_are_left_behind_and_can_be_hidden(figure: Page) -> None:
     _seek(figure, 30)
-    shown = wait_until_still(figure)
+    visible_rows = wait_until_still(figure)
     _switch(figure, "ground")
-    hidden = wait_for_picture(figure, lambda now: shown["orange"] > now["orange"] + 150)
-    assert shown["blue"] > hidden["blue"] + 150
+    hidden = wait_for_picture(figure, lambda now: visible_rows["orange"] > now["orange"] + 150)
+    assert visible_rows["blue"] > hidden["blue"] + 150
     assert min(hidden["orange"], hidden["blue"]) > 200, "the figure is hidden too"
 
 
@@ -177,13 +177,13 @@ def test_a_take_of_two_feet_says_which_parts_are_estimated(
     files, sensors = filling.simulated_files()
     feet = {k: v if v in ("foot_l", "foot_r") else None for k, v in sensors.items()}
     faint_page = _open(opened, solid, _analysed(running, files, feet))
-    seen = []
+    observations = []
     for page, estimated in ((figure, False), (faint_page, True)):
         expect(page.locator("[data-estimated]")).to_be_visible(visible=estimated)
         _switch(page, "ground")
         _seek(page, 20)
-        seen.append(wait_until_still(page))
-    full, faint = seen
+        observations.append(wait_until_still(page))
+    full, faint = observations
     for colour in ("orange", "blue"):
         assert 30 < faint[colour] < 0.6 * full[colour]
 
@@ -191,14 +191,16 @@ def test_a_take_of_two_feet_says_which_parts_are_estimated(
 def test_the_figure_is_looked_at_from_every_side(figure: Page) -> None:
     _switch(figure, "ground")
     _seek(figure, 12)
-    seen = [wait_until_still(figure)]
+    observations = [wait_until_still(figure)]
     for view in ("right", "front", "top"):
         figure.get_by_label("View from").select_option(view)
-        wait_for_picture(figure, lambda now: now != seen[-1])
-        seen.append(wait_until_still(figure))
-    assert [x for x in seen if not 0.3 < x["x"] < 0.7] == []
+        wait_for_picture(figure, lambda now: now != observations[-1])
+        observations.append(wait_until_still(figure))
+    assert [x for x in observations if not 0.3 < x["x"] < 0.7] == []
     # of legs seen from above less is seen than from the side
-    assert seen[3]["orange"] + seen[3]["blue"] < 0.7 * (seen[0]["orange"] + seen[0]["blue"])
+    assert observations[3]["orange"] + observations[3]["blue"] < 0.7 * (
+        observations[0]["orange"] + observations[0]["blue"]
+    )
 
 
 def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
@@ -207,10 +209,10 @@ def test_a_picture_of_the_figure_can_be_saved(figure: Page) -> None:
     with figure.expect_download(timeout=30_000) as waiting:
         figure.get_by_role("button", name="Save picture").click()
     assert re.fullmatch(r"figure-[\d.]+s\.png", waiting.value.suggested_filename)
-    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    values = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
     for side in SIDES:
-        assert pixels_of(found, TINTS[False][side]).sum() > 200, side
-    assert _is_large(found, figure)
+        assert pixels_of(values, TINTS[False][side]).sum() > 200, side
+    assert _is_large(values, figure)
 
 
 def _is_large(picture: np.ndarray, page: Page) -> bool:
@@ -230,9 +232,9 @@ def test_a_picture_saved_on_a_phone_is_as_large(opened: Opener, solid: Browser, 
     _wait_until_drawn(page)
     with page.expect_download(timeout=60_000) as waiting:
         page.get_by_role("button", name="Save picture").click()
-    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
-    assert _is_large(found, page)
-    assert pixels_of(found, TINTS[False]["left"]).sum() > 2000
+    values = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    assert _is_large(values, page)
+    assert pixels_of(values, TINTS[False]["left"]).sum() > 2000
 
 
 EMPTY_AT_FIRST = """async () => {
@@ -253,8 +255,8 @@ def test_a_picture_of_an_empty_canvas_is_not_saved(opened: Opener) -> None:
     page = opened(REST)
     with page.expect_download(timeout=30_000) as waiting:
         page.evaluate(EMPTY_AT_FIRST)
-    found = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
-    assert found[24, 16].tolist() == pytest.approx([255, 165, 0], abs=12)
+    values = np.asarray(Image.open(waiting.value.path()).convert("RGB"))
+    assert values[24, 16].tolist() == pytest.approx([255, 165, 0], abs=12)
 
 
 def test_a_video_of_the_walking_figure_can_be_saved(figure: Page) -> None:
@@ -284,9 +286,9 @@ def test_a_real_walk_leaves_its_steps(opened: Opener, solid: Browser, running: R
     files = {p.name: p.read_bytes() for p in sorted(folder.glob("*.txt"))}
     page = _open(opened, solid, _analysed(running, files, NEURA))
     _seek(page, 19)
-    shown = wait_until_still(page)
+    visible_rows = wait_until_still(page)
     _switch(page, "ground")
-    hidden = wait_for_picture(page, lambda now: now["orange"] < shown["orange"] - 100)
+    hidden = wait_for_picture(page, lambda now: now["orange"] < visible_rows["orange"] - 100)
     assert hidden["orange"] > 0
 
 

@@ -32,14 +32,14 @@ def test_a_report_is_signed_shared_by_a_slip_with_a_code_and_reopened(opened: Op
     # the slip goes to somebody else: nothing else is on the paper, the patient's code least of all
     page.emulate_media(media="print")
     expect(slip).to_be_visible()
-    for other in (page.locator(".page-head"), page.get_by_role("heading", name="Signed versions")):
-        expect(other).to_be_hidden()
+    for second in (page.locator(".page-head"), page.get_by_role("heading", name="Signed versions")):
+        expect(second).to_be_hidden()
     page.emulate_media(media="null")
     # whoever has no account
     outside = opened(url, signed_in=False)
     expect(outside.get_by_text("Longer steps.")).to_be_visible()
-    said = outside.locator(".sheet").first.evaluate("s => getComputedStyle(s).width")
-    assert said.startswith("793"), "its style came with it"
+    evaluation = outside.locator(".sheet").first.evaluate("s => getComputedStyle(s).width")
+    assert evaluation.startswith("793"), "its style came with it"
     with page.expect_navigation():
         page.get_by_role("link", name="Done").click()
     with page.expect_navigation():

@@ -1,4 +1,4 @@
-"""A security key in real Chromium: its virtual authenticator stands on the USB port."""
+"""Security keys in Chromium with its virtual USB authenticator."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ WHO = "keyed"
 def test_a_key_is_set_up_signs_in_and_is_removed(flat: Browser, running: RunningServer) -> None:
     here = running.url.replace("127.0.0.1", "localhost")
     with running.client() as client:
-        made = client.post("/api/v1/users", json={"name": WHO, "role": "viewer", "password": PASSWORD})
-        made.raise_for_status()
+        response = client.post("/api/v1/users", json={"name": WHO, "role": "viewer", "password": PASSWORD})
+        response.raise_for_status()
     context = flat.new_context(base_url=here, locale="en-US")
     try:
         page = context.new_page()

@@ -1,4 +1,4 @@
-"""What a tablet held upright or a phone keeps of a page, and how forms and questions stand on it."""
+"""Layout of pages, forms and dialogs on upright tablets and phones."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def test_the_one_question_comes_first_and_unused_files_are_folded(
         box = question.bounding_box()
         assert box is not None
         assert box["y"] + box["height"] <= height, f"below the fold at {width}"
-        before = page.locator("sensor-map .note:visible").first
-        assert before.get_attribute("data-ask") is not None, "another box stands before the question"
+        initial_first = page.locator("sensor-map .note:visible").first
+        assert initial_first.get_attribute("data-ask") is not None, "another box stands before the question"
         # beside it at most what was found about copies; what was no recording waits behind one line
         assert page.locator("sensor-map .note:visible").count() <= 2
         unused = page.locator("[data-unused]")

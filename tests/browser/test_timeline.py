@@ -42,16 +42,16 @@ def timeline(opened: Opener, running: RunningServer, walked: str) -> Iterator[Pa
 
 def review(running: RunningServer, session: str) -> dict[str, Any]:
     with running.client() as client:
-        found: dict[str, Any] = client.get(f"/api/v1/sessions/{session}/edits").json()
-    return found
+        fields: dict[str, Any] = client.get(f"/api/v1/sessions/{session}/edits").json()
+    return fields
 
 
 def handle(page: Page, kind: str, n: int = 2, side: str = "left") -> Locator:
     return page.locator(f"[data-side={side}] .ev.{kind}").nth(n)
 
 
-def drag(page: Page, what: Locator, by_px: float) -> None:
-    box = what.bounding_box()
+def drag(page: Page, label: Locator, by_px: float) -> None:
+    box = label.bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     page.mouse.move(x, y)
@@ -88,7 +88,7 @@ def pick_counted(page: Page) -> Locator:
 def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_them_back(
     timeline: Page, running: RunningServer, walked: str
 ) -> None:
-    before = numbers(timeline)
+    initial_numbers = numbers(timeline)
     event = handle(timeline, "tc")
     was = float(event.get_attribute("aria-valuenow") or 0)
     drag(timeline, event, 20)
@@ -100,13 +100,13 @@ def test_a_dragged_foot_off_changes_the_numbers_within_a_second_and_undo_brings_
     assert min(box["width"], box["height"]) >= 44
     assert edit["time_s"] == pytest.approx(was, abs=0.001)
     assert 0.05 < edit["to_s"] - was < 0.4
-    after = numbers(timeline)
-    assert after != before
+    final_numbers = numbers(timeline)
+    assert final_numbers != initial_numbers
     assert int(timeline.locator("take-timeline").get_attribute("data-took") or 10_000) < 1000
     expect(timeline.locator("[data-edits]")).to_contain_text("foot-off moved from")
     timeline.locator("[data-undo]").click()
     done(timeline, "undone")
-    assert numbers(timeline) == before
+    assert numbers(timeline) == initial_numbers
     expect(timeline.locator("[data-undo]")).to_be_disabled()
 
 
@@ -148,12 +148,12 @@ def test_numbers_of_an_earlier_change_that_come_late_are_not_shown(timeline: Pag
         drag(timeline, handle(timeline, "tc"), 25)
     drag(timeline, handle(timeline, "tc", side="right"), 25)
     done(timeline, "right foot-off moved")
-    after = numbers(timeline)
+    final_numbers = numbers(timeline)
     expect(timeline.locator("#numbers")).to_have_css("opacity", "1")
     ((route, answer),) = late
     route.fulfill(response=answer)
     done(timeline, "left foot-off moved")
-    assert numbers(timeline) == after
+    assert numbers(timeline) == final_numbers
     timeline.unroute("**/timeline/numbers")
 
 
@@ -163,9 +163,9 @@ def test_an_event_stops_at_its_neighbour_of_the_same_foot(
     contact = handle(timeline, "ic")
     drag(timeline, contact, 700)
     done(timeline, "left contact moved")
-    found = review(running, walked)
-    moved = found["edits"][0]["to_s"]
-    following = min(e["time_s"] for e in found["events"] if e["side"] == "left" and e["time_s"] > moved)
+    result = review(running, walked)
+    moved = result["edits"][0]["to_s"]
+    following = min(e["time_s"] for e in result["events"] if e["side"] == "left" and e["time_s"] > moved)
     assert following - moved == pytest.approx(0.051, abs=0.002)
 
 
@@ -227,23 +227,23 @@ def test_undone_changes_are_redone_by_keys_and_button_until_there_is_a_new_one(
             timeline.keyboard.press("ArrowRight")
         timeline.keyboard.press("Enter")
         expect(timeline.locator("[data-edit-count]")).to_have_text("1" if presses == 3 else "2")
-    both, after = edits(), numbers(timeline)
+    pair, final_numbers = edits(), numbers(timeline)
     expect(redo).to_be_disabled()
     timeline.keyboard.press("Control+Shift+Z")  # nothing was undone
     expect(timeline.locator("[data-said]")).to_contain_text("left contact moved")
-    assert edits() == both
-    for again in ("Control+Shift+Z", "Control+Shift+z", "Control+y", "Meta+Shift+Z", "button"):
+    assert edits() == pair
+    for second in ("Control+Shift+Z", "Control+Shift+z", "Control+y", "Meta+Shift+Z", "button"):
         timeline.keyboard.press("Control+z")
         done(timeline, "undone")
         expect(redo).to_be_enabled()
-        assert edits() == both[:1]
-        if again == "button":
+        assert edits() == pair[:1]
+        if second == "button":
             redo.click()
         else:
-            timeline.keyboard.press(again)
+            timeline.keyboard.press(second)
         done(timeline, "redone")
-        assert edits() == both
-        assert numbers(timeline) == after
+        assert edits() == pair
+        assert numbers(timeline) == final_numbers
     for _ in range(2):
         timeline.locator("[data-undo]").click()
         expect(timeline.locator("take-timeline")).to_have_attribute("aria-busy", "false")
@@ -296,14 +296,14 @@ def test_a_redo_is_refused_when_somebody_else_changed_something(
 def test_an_event_is_added_where_the_cursor_is(timeline: Page, running: RunningServer, walked: str) -> None:
     event = handle(timeline, "tc")
     event.focus()
-    at = event.get_attribute("aria-valuenow")
+    position = event.get_attribute("aria-valuenow")
     timeline.keyboard.press("Delete")
     done(timeline, "deleted")
     timeline.keyboard.press("a")
     dialog = timeline.locator("dialog[open]")
     expect(dialog.locator("#add-side")).to_have_value("left")
     expect(dialog.locator("#add-kind")).to_have_value("tc")
-    expect(dialog.locator("#add-time")).to_have_value(at or "")
+    expect(dialog.locator("#add-time")).to_have_value(position or "")
     dialog.get_by_role("button", name="Add").click()
     done(timeline, "foot-off added")
     added = [e for e in review(running, walked)["events"] if e["source"] == "manual"]
@@ -364,15 +364,17 @@ def test_a_stride_whose_contact_was_typed_later_stays_the_one_in_the_fields(time
     """The cursor stayed where the contact had been, so the fields were those of the stride before."""
     pick_counted(timeline)
     contact = timeline.get_by_label("Contact", exact=True)
-    others = [timeline.get_by_label(name, exact=True).input_value() for name in ("Foot-off", "Next contact")]
+    other_input_values = [
+        timeline.get_by_label(name, exact=True).input_value() for name in ("Foot-off", "Next contact")
+    ]
     later = f"{float(contact.input_value()) + 0.05:.3f}"
     contact.fill(later)
     contact.press("Enter")
     done(timeline, "left contact moved")
     expect(contact).to_have_value(later)
     expect(contact).to_be_focused()
-    expect(timeline.get_by_label("Foot-off", exact=True)).to_have_value(others[0])
-    expect(timeline.get_by_label("Next contact", exact=True)).to_have_value(others[1])
+    expect(timeline.get_by_label("Foot-off", exact=True)).to_have_value(other_input_values[0])
+    expect(timeline.get_by_label("Next contact", exact=True)).to_have_value(other_input_values[1])
     expect(timeline.locator("#h-stride")).to_have_text(f"Left stride, {float(later):.2f} s")
 
 
@@ -400,16 +402,16 @@ def test_the_value_beside_a_lane_is_the_signals_own(
 ) -> None:
     timeline.locator("#lane-0").select_option("knee_flexion")
     handle(timeline, "ic").focus()
-    at = float(timeline.evaluate("document.activeElement.ariaValueNow"))
+    position = float(timeline.evaluate("document.activeElement.ariaValueNow"))
     with running.client() as client:
-        query = {"start_s": max(at - 0.005, 0), "end_s": at + 0.005, "points": 10}
+        query = {"start_s": max(position - 0.005, 0), "end_s": position + 0.005, "points": 10}
         piece = client.get(f"/api/v1/sessions/{walked}/signals/knee_flexion", params=query).json()
     near = [v for v in piece["low"]["left"] if v is not None]
     timeline.wait_for_timeout(600)
     text = timeline.locator("[data-values]").first.inner_text().replace("−", "-")
-    found = re.search(r"L (-?[\d.]+)", text)
-    assert found is not None
-    assert min(near) - 0.6 <= float(found[1]) <= max(near) + 0.6
+    match = re.search(r"L (-?[\d.]+)", text)
+    assert match is not None
+    assert min(near) - 0.6 <= float(match[1]) <= max(near) + 0.6
 
 
 def test_signals_have_round_ticks_by_the_rule_of_the_report(timeline: Page) -> None:
@@ -446,9 +448,11 @@ def test_the_figure_comes_when_asked_for_and_stands_where_the_event_is(
     page.get_by_role("button", name="Show the avatar").click()
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.locator("[data-side=left] .ev.ic").first.focus()
-    at = float(page.evaluate("document.activeElement.ariaValueNow"))
+    position = float(page.evaluate("document.activeElement.ariaValueNow"))
     page.wait_for_function(
-        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.02", arg=at, timeout=30_000
+        "t => Math.abs(document.querySelector('gait-view').dataset.shown - t) < 0.02",
+        arg=position,
+        timeout=30_000,
     )
 
 
@@ -500,6 +504,6 @@ def test_the_dialogs_obey_the_design_system(opened: Opener, walked: str, width: 
     expect(page.locator("[data-verdict]")).to_have_text("included")
     for button in ("[data-add]", "[data-out]"):
         page.locator(button).click()
-        found = layout_faults(page) | text_faults(page)
-        assert not found, f"{button} {width}: {found}"
+        result = layout_faults(page) | text_faults(page)
+        assert not result, f"{button} {width}: {result}"
         page.locator("dialog[open]").get_by_role("button", name="Cancel").click()

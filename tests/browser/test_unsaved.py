@@ -1,4 +1,4 @@
-"""What was typed and not sent is asked for; a long word breaks no page; a visit's name follows."""
+"""Warnings for unsaved input, line breaks of long words, updated visit names."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ def patient(running: RunningServer) -> str:
 
 def leave(page: Page) -> list[str]:
     """Reload, stay if asked; the questions that were asked."""
-    asked: list[str] = []
+    requested_names: list[str] = []
 
     def stay(dialog: Dialog) -> None:
-        asked.append(dialog.type)
+        requested_names.append(dialog.type)
         dialog.dismiss()
 
     page.on("dialog", stay)
     page.evaluate("setTimeout(() => location.reload(), 0)")
     page.wait_for_timeout(800)
     page.remove_listener("dialog", stay)
-    return asked
+    return requested_names
 
 
 def test_a_note_that_is_being_written_is_asked_for_before_the_page_goes(opened: Opener, patient: str) -> None:
@@ -47,16 +47,16 @@ def test_a_visit_being_made_is_asked_for_and_goes_when_it_is_sent(opened: Opener
     page = opened(f"/patients/{patient}/sessions/new")
     page.get_by_label("Note").press_sequentially("Tired today")
     assert leave(page) == ["beforeunload"]
-    asked: list[str] = []
+    requested_names: list[str] = []
 
     def go(dialog: Dialog) -> None:
-        asked.append(dialog.type)
+        requested_names.append(dialog.type)
         dialog.accept()
 
     page.on("dialog", go)
     page.get_by_role("button", name="Upload a recording").click()
     page.wait_for_url("**/upload")
-    assert asked == []
+    assert requested_names == []
 
 
 def test_the_name_of_a_visit_follows_its_protocol_until_somebody_writes_one(

@@ -43,8 +43,8 @@ def test_eleven_files_become_a_session_page(solid: Browser, running: RunningServ
     page.locator("[data-files]").set_input_files([str(f) for f in files])
 
     # what was found: nine sensors, two byte copies said
-    found = page.locator("sensor-map")
-    expect(found).to_be_visible(timeout=60_000)
+    element = page.locator("sensor-map")
+    expect(element).to_be_visible(timeout=60_000)
     facts = page.locator("dl.dl").inner_text()
     assert "9 and 2 copies" in facts
     assert "100 Hz" in facts
@@ -76,10 +76,10 @@ def test_a_table_without_a_time_asks_for_it_in_words(opened: Opener, running: Ru
         session = add_session(client, patient, "Walk, no time")
         client.put(f"/api/v1/sessions/{session}/files/{table.name}", content=data).raise_for_status()
     page = opened(f"/sessions/{session}/upload")
-    said = page.locator("[data-check=bad]")
-    expect(said).to_have_text("Enter the sampling rate or select the time column.")
+    element = page.locator("[data-check=bad]")
+    expect(element).to_have_text("Enter the sampling rate or select the time column.")
     page.locator("[data-rate]").fill("204.8")
-    expect(said).to_have_count(0)
+    expect(element).to_have_count(0)
     expect(page.locator("[data-check]")).to_have_count(2)
 
 
@@ -221,9 +221,9 @@ def _replays(page: Page, url: str) -> None:
     canvas = page.frame_locator("gait-view iframe").locator("canvas[data-engine]")
     expect(canvas).to_be_visible(timeout=30_000)
     # the charts, the time bar and the figure follow one clock
-    shown = view.get_attribute("data-shown")
+    visible_attribute = view.get_attribute("data-shown")
     page.keyboard.press("j")
-    expect(view).not_to_have_attribute("data-shown", shown or "", timeout=10_000)
+    expect(view).not_to_have_attribute("data-shown", visible_attribute or "", timeout=10_000)
     at = float(page.locator("time-bar input").input_value())
     expect(page.locator("[data-chart] .cursor").first).not_to_have_attribute("hidden", "hidden")
     page.wait_for_function(

@@ -1,4 +1,4 @@
-"""A film beside the figure: added with consent, aligned by one contact, in step with the one clock."""
+"""Video of a trial: consent, alignment at one contact, synchronous playback."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def test_a_film_is_aligned_by_one_contact_and_follows_the_clock(
     expect(player).to_have_attribute("offset", re.compile(r"-?\d"))
     expect(same).to_be_hidden()
     with running.client() as client:
-        kept = client.get(f"/api/v1/sessions/{filled.done}/video").json()
-    assert abs(kept["offset_s"] + contact - 0.6) < 0.06
+        stored_body = client.get(f"/api/v1/sessions/{filled.done}/video").json()
+    assert abs(stored_body["offset_s"] + contact - 0.6) < 0.06
     time = page.locator("time-bar input")
-    for after in (0.5, 0.2):
-        time.evaluate("(e, v) => { e.value = v; e.dispatchEvent(new Event('input')); }", contact + after)
-        page.wait_for_function(SEEN, arg=0.6 + after)
+    for final in (0.5, 0.2):
+        time.evaluate("(e, v) => { e.value = v; e.dispatchEvent(new Event('input')); }", contact + final)
+        page.wait_for_function(SEEN, arg=0.6 + final)
     time.evaluate("(e) => { e.value = 0; e.dispatchEvent(new Event('input')); }")
     expect(player.get_by_text("does not show this moment")).to_be_visible()
     page.goto(f"/sessions/{filled.done}/data")

@@ -121,25 +121,27 @@ def test_the_visit_before_walks_as_a_ghost_with_the_figure(
     opened: Opener, filled: Filled, solid: Browser
 ) -> None:
     page = opened("/patients", browser=solid)
-    told: list[str] = []
-    asked: list[str] = []
+    names: list[str] = []
+    requested_names: list[str] = []
 
     def listen(socket: WebSocket) -> None:
-        asked.append(socket.url)
-        socket.on("framesent", lambda sent: told.append(str(sent)))
+        requested_names.append(socket.url)
+        socket.on("framesent", lambda sent: names.append(str(sent)))
 
     page.on("websocket", listen)
     page.goto(f"/sessions/{filled.done}/compare/{filled.earlier}")
     page.locator("gait-view[data-state=open]").wait_for(timeout=30_000)
     page.frame_locator("gait-view iframe").locator("canvas[data-engine]").wait_for(timeout=30_000)
-    assert any(f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in asked)
+    assert any(
+        f"/sessions/{filled.done}/replay" in a and f"ghost={filled.earlier}" in a for a in requested_names
+    )
     menu = page.get_by_label("Overlay")
     expect(menu.locator("option:checked")).to_have_text("21 Oct 2026")
     expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", "visit")
-    for chosen, shown in (("norm", "norm"), ("left", "left"), ("", "")):
+    for chosen, view in (("norm", "norm"), ("left", "left"), ("", "")):
         menu.select_option(chosen)
-        expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", shown)
-    sent = [json.loads(t)["ghost"] for t in told if "ghost" in t]
+        expect(page.locator("gait-view")).to_have_attribute("data-ghost-shown", view)
+    sent = [json.loads(t)["ghost"] for t in names if "ghost" in t]
     assert sent == ["visit", "norm", "left", None]
     # one cursor for the figure and all charts
     chart = page.locator("[data-variable=knee_flexion]")

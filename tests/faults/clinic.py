@@ -35,15 +35,15 @@ T = TypeVar("T")
 def until(look: Callable[[], T | None], patience_s: float = PATIENCE_S) -> T:
     limit = time.monotonic() + patience_s
     while time.monotonic() < limit:
-        found = look()
-        if found:
-            return found
+        result = look()
+        if result:
+            return result
         time.sleep(0.02)
     raise AssertionError(f"waited {patience_s:g} s in vain for {look}")
 
 
 def state_of(pid: int) -> str:
-    """The letter the kernel has for a process: T = stopped, Z and X = dead, as it is when there is none."""
+    """Process state letter from the kernel: T = stopped, Z and X = dead, also for missing processes."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
     except (FileNotFoundError, ProcessLookupError):
@@ -55,7 +55,7 @@ def alive(pid: int) -> bool:
 
 
 def find_room(clinic: Clinic, name: str) -> Settings:
-    """Settings for a restore: an empty folder beside the clinic's, on PostgreSQL an empty database too."""
+    """Settings for a restore: an empty folder next to the clinic's, on PostgreSQL also an empty database."""
     url = make_lasting_database(migrated=False) if clinic.settings.database_url else ""
     return replace(clinic.settings, data_dir=clinic.folder.parent / name, database_url=url)
 
@@ -101,15 +101,15 @@ class Clinic:
             return self.queue.submit(c, key=f"tiny:{number}", kind="tiny", params=fixed, recording_id=this.id)
 
     def hold(self, stage: str) -> tuple[JobView, Path, Path]:
-        """Submit a job that waits at a stage; the files that say it is there and that let it go on."""
+        """Submit a job that waits at a stage; return the files that signal its arrival and release it."""
         reached = self.folder / f"reached-{stage}"
         gate = self.folder / f"gate-{stage}"
         return self.submit(hold_at=stage, reached=str(reached), gate=str(gate)), reached, gate
 
     def ended(self, view: JobView, patience_s: float = PATIENCE_S) -> JobView:
         def look() -> JobView | None:
-            found = self.queue.get(view.id)
-            return found if found is not None and found.finished else None
+            response = self.queue.get(view.id)
+            return response if response is not None and response.finished else None
 
         return until(look, patience_s)
 

@@ -17,9 +17,9 @@ from tests.helpers.engines import engine, postgres, source  # noqa: F401 - fixtu
 @pytest.fixture
 def clinic(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Clinic]:
     """A lease of 1.5 s, so that deaths are seen soon; a test may ask for another."""
-    made = Clinic(tmp_path, lease_s=getattr(request, "param", 1.5))
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path, lease_s=getattr(request, "param", 1.5))
+    yield new_clinic
+    new_clinic.db.close()
 
 
 @pytest.fixture

@@ -1,9 +1,8 @@
-"""`sagittal serve` again and again without the seconds of its imports.
+"""Run `sagittal serve` repeatedly without repeating its imports.
 
-Run as a process: it wires the application once and forks for every line on its standard input, which holds a
-server's settings as variables of the environment (JSON). Each fork is a whole server, whose sockets, lock,
-database and threads are made after the fork; it says on standard output "at <address>", and this process
-"pid <number>" of it.
+The process wires the application once and forks for each line of standard input, a JSON object of environment
+variables. Each fork is a complete server whose sockets, lock, database and threads are created after the
+fork; it prints "at <address>", the parent "pid <number>".
 """
 
 from __future__ import annotations

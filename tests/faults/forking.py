@@ -1,4 +1,4 @@
-"""Servers that start in a tenth of a second: each is a fork of one process that has all imports behind it."""
+"""Servers that start within a tenth of a second, forked from a process with all imports loaded."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Forker:
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps(make_environment(settings)) + "\n")
         self._process.stdin.flush()
-        said = dict((self._word(), self._word()))
-        return ForkedServer(int(said["pid"]), said["at"])
+        mapping = dict((self._word(), self._word()))
+        return ForkedServer(int(mapping["pid"]), mapping["at"])
 
     def end(self) -> None:
         """Start no more."""
@@ -45,13 +45,13 @@ class Forker:
 
     def _word(self) -> tuple[str, str]:
         assert self._process.stdout is not None
-        kind, _, rest = self._process.stdout.readline().strip().partition(" ")
-        assert kind in {"pid", "at"}, f"the server did not start: {kind} {rest}"
-        return kind, rest
+        kind, _, remainder = self._process.stdout.readline().strip().partition(" ")
+        assert kind in {"pid", "at"}, f"the server did not start: {kind} {remainder}"
+        return kind, remainder
 
 
 class ForkedServer:
-    """A running server; nobody but its forker is its parent, so its end is seen by its process id."""
+    """Running forked server; its end is detected by process id, as only the forker is its parent."""
 
     def __init__(self, pid: int, address: str) -> None:
         self.pid, self.address = pid, address

@@ -1,4 +1,4 @@
-"""A disk of which only what was synced is sure: every state in which a power cut may leave it."""
+"""Model of a disk that guarantees synced data only: all states a power cut may leave."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from sagittal.server.storage import fs
 
 
 class ModelDisk(fs.System):
-    """What a file system may keep when the power goes: only what was synced is sure.
+    """File system that guarantees synced data only.
 
-    A file's unsynced bytes may be there, half there or zero; a folder's unsynced changes may have reached the
-    disk up to any prefix of their order; a cut may not have. `states` lists all that the disk may show after
+    Unsynced bytes may be present, partial or zero; unsynced changes of a folder may have been written up to
+    any prefix of their order; a truncation may be missing. `states` enumerates the possible contents after
     the last call.
     """
 
@@ -103,9 +103,9 @@ class ModelDisk(fs.System):
         self.history.append(list(self.states()))
 
     def states(self) -> Iterator[dict[Path, bytes]]:
-        for kept in range(len(self._pending) + 1):
+        for retained in range(len(self._pending) + 1):
             names = dict(self._durable)
-            for change in self._pending[:kept]:
+            for change in self._pending[:retained]:
                 self._apply(names, change)
             choices = []
             for path, inode in names.items():

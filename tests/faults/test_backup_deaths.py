@@ -43,9 +43,9 @@ STEP = {"sqlite": 1, "postgresql": 13}
 @pytest.fixture
 def clinic(tmp_path: Path) -> Iterator[Clinic]:
     (tmp_path / "disk").mkdir()
-    made = Clinic(tmp_path / "home", lease_s=1.5)
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path / "home", lease_s=1.5)
+    yield new_clinic
+    new_clinic.db.close()
 
 
 def refer(clinic: Clinic, blob: Blob) -> None:
@@ -99,13 +99,13 @@ def test_a_restore_that_dies_anywhere_is_made_again(
 ) -> None:
     clinic.settings.live.mkdir()
     (clinic.settings.live / f"{'a' * 32}.log").write_bytes(b"SAGLIVE1\n")
-    made = make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", None)
+    result = make_backup(clinic.db, clinic.settings, clinic.folder.parent / "disk", None)
     for deaths in range(0, 400, STEP[engine]):
         home = find_room(clinic, f"again{deaths}")
         monkeypatch.setattr(fs, "system", Dying(deaths))
         died = False
         try:
-            restore(made.path, home, None)
+            restore(result.path, home, None)
         except PowerError:
             died = True
         monkeypatch.setattr(fs, "system", fs.System())
@@ -115,7 +115,7 @@ def test_a_restore_that_dies_anywhere_is_made_again(
             if home.restoring.exists():
                 with pytest.raises(StrangersError, match="was interrupted"):
                     refuse_strangers(home)
-            restore(made.path, home, None)
+            restore(result.path, home, None)
         assert exists(home.database_source)
         refuse_strangers(home)
         if deaths % 10 == 0:
@@ -136,12 +136,12 @@ def test_a_disk_that_refuses_is_told_and_nothing_is_left(
                 make_backup(clinic.db, clinic.settings, disk, key)
             monkeypatch.setattr(fs, "system", fs.System())
             assert {p.name for p in disk.iterdir()} <= BESIDE
-    made = make_backup(clinic.db, clinic.settings, disk, None)
+    result = make_backup(clinic.db, clinic.settings, disk, None)
     home = find_room(clinic, "again")
     for fail_at in range(5, 40, 5):
         monkeypatch.setattr(fs, "system", FailingSystem(fail_at, number))
         with pytest.raises(RestoreError, match="nothing was put in place"):
-            restore(made.path, home, None)
+            restore(result.path, home, None)
         monkeypatch.setattr(fs, "system", fs.System())
         assert {p.name for p in home.data_dir.iterdir()} <= {"server.lock"}
 
@@ -177,19 +177,19 @@ def test_killed_in_the_midst(clinic: Clinic) -> None:
         for one in list_backups(disk):
             assert try_restore(one.path, clinic.settings, None).patients == 1
             one.path.unlink()
-    made = make_backup(clinic.db, clinic.settings, disk, None)
+    result = make_backup(clinic.db, clinic.settings, disk, None)
     home = find_room(clinic, "again")
     data = ["--data", str(home.data_dir)]
     for _ in range(3):
         kill(
-            run("restore", str(made.path), *data, url=home.database_url),
+            run("restore", str(result.path), *data, url=home.database_url),
             lambda at=home.restoring: any(at.rglob("*.tmp")),  # type: ignore[misc]
         )
         if exists(home.database_source):
             assert is_whole(home)
             fs.remove_tree(home.data_dir)
             home = find_room(clinic, "again")
-    assert run("restore", str(made.path), *data, url=home.database_url).wait() == 0
+    assert run("restore", str(result.path), *data, url=home.database_url).wait() == 0
     assert is_whole(home)
 
 
@@ -217,5 +217,5 @@ def test_memory_does_not_grow_with_what_is_backed_up(clinic: Clinic) -> None:
             receiver.write(os.urandom(1 << 20))
         big = receiver.keep()
     refer(clinic, big)
-    for before, after in zip(small, both("big.tar.age"), strict=True):
-        assert after - before < 40_000  # kB; the file has 120 000
+    for initial, final in zip(small, both("big.tar.age"), strict=True):
+        assert final - initial < 40_000  # kB; the file has 120 000

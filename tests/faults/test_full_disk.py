@@ -1,4 +1,4 @@
-"""A disk that is really full: changes say so, reading and signing in go on, no promise is broken."""
+"""A really full disk: changes are refused, reading and sign-in continue, no guarantee is broken."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def disk(tmp_path: Path) -> Iterator[Path]:
 
 
 class Visit:
-    """A clinic on a small disk, with one analysed session and somebody signed in."""
+    """Clinic on a small disk with one analysed session and a signed-in user."""
 
     def __init__(self, clinic: Clinic) -> None:
         self.clinic = clinic
@@ -95,16 +95,16 @@ def changes(v: Visit) -> list[tuple[str, str, dict[str, Any]]]:
 @sqlite_only
 async def test_a_full_disk_answers_every_change_with_507_and_a_sentence(visit: Visit, disk: Path) -> None:
     async with visit.clinic.client("admin", raises=False) as client:
-        before = visit.rows()
+        initial_rows = visit.rows()
         with full(disk):
             for method, path, body in changes(visit):
                 answer = await client.request(method, path, **body)
-                said = f"{method} {path}: {answer.text}"
-                assert answer.status_code == 507, said
-                assert answer.headers["content-type"] == "application/problem+json", said
-                assert answer.json()["code"] == "disk_full", said
-                assert "make room" in answer.json()["detail"], said
-        assert visit.rows() == before
+                message = f"{method} {path}: {answer.text}"
+                assert answer.status_code == 507, message
+                assert answer.headers["content-type"] == "application/problem+json", message
+                assert answer.json()["code"] == "disk_full", message
+                assert "make room" in answer.json()["detail"], message
+        assert visit.rows() == initial_rows
         for method, path, body in changes(visit):
             answer = await client.request(method, path, **body)
             assert answer.status_code < 300, f"{method} {path}: {answer.text}"
@@ -142,7 +142,7 @@ async def test_on_a_full_disk_people_sign_in_read_results_and_sign_out(visit: Vi
     person = {"name": "viewer", "password": PASSWORD}
     async with clinic.client(raises=False) as client:
         with full(disk):
-            before = visit.rows()
+            initial_rows = visit.rows()
             signed = await client.post(f"{API}/sign-in", json=person)
             assert signed.status_code == 200, signed.text
             for path in readings(visit):
@@ -152,17 +152,17 @@ async def test_on_a_full_disk_people_sign_in_read_results_and_sign_out(visit: Vi
             assert wrong.status_code == 401
             assert (await client.post(f"{API}/sign-out")).status_code == 204
             assert (await client.get(f"{API}/account")).status_code == 401
-            assert visit.rows() == before
+            assert visit.rows() == initial_rows
         # what was looked at meanwhile is written before the next that is
         async with clinic.client("admin") as admin:
             await admin.get(f"{API}/patients/{visit.patient}")
-    new = [r for r in reversed(visit.rows()) if r.seq > before[0].seq]
-    said = [(r.action, r.user_name) for r in new]
-    assert said[0] == ("sign_in", "viewer")
-    assert said[-1] == ("patient.opened", "admin")
-    assert ("sign_out", "viewer") in said
+    new = [r for r in reversed(visit.rows()) if r.seq > initial_rows[0].seq]
+    message = [(r.action, r.user_name) for r in new]
+    assert message[0] == ("sign_in", "viewer")
+    assert message[-1] == ("patient.opened", "admin")
+    assert ("sign_out", "viewer") in message
     expected = {"report.opened", "session.opened", "patient.opened", "analysis.file_opened"}
-    assert expected <= {action for action, _ in said}
+    assert expected <= {action for action, _ in message}
     assert all(earlier.at <= later.at for earlier, later in itertools.pairwise(new))
     with clinic.db.read() as c:
         assert audit.find_problems(c) == []
@@ -192,13 +192,13 @@ async def test_a_disk_that_became_read_only_is_said_and_can_be_read(disk: Path, 
         async with open_clinic(disk, min_free_bytes=0) as clinic:
             v = Visit(clinic)
             # the same folder, seen read-only; the write-ahead log is there, as when a disk is remounted
-            there = Database(frozen / clinic.settings.database.name)
+            target = Database(frozen / clinic.settings.database.name)
             engines = clinic.db._reader, clinic.db._writer
-            clinic.db._reader, clinic.db._writer = there._reader, there._writer
+            clinic.db._reader, clinic.db._writer = target._reader, target._writer
             blobs = clinic.app.state.blobs
             blobs.root, blobs.incoming = frozen / "blobs", frozen / "blobs" / "incoming"
             await _use_read_only(v)
-            there.close()
+            target.close()
             clinic.db._reader, clinic.db._writer = engines
     finally:
         subprocess.run(["umount", "--lazy", str(frozen)], check=False)
@@ -340,11 +340,11 @@ def test_a_server_that_finds_a_full_disk_says_so_and_sends_nobody_to_the_backups
 ) -> None:
     database = Settings(data_dir=disk).database
     upgrade(database)
-    with full(disk), pytest.raises(MigrationError) as said:
+    with full(disk), pytest.raises(MigrationError) as error:
         upgrade(database)
-    assert "is full" in str(said.value)
-    assert "make room" in str(said.value)
-    assert "backup" not in str(said.value)
+    assert "is full" in str(error.value)
+    assert "make room" in str(error.value)
+    assert "backup" not in str(error.value)
     assert upgrade(database) is None
 
 
@@ -357,13 +357,13 @@ async def test_nothing_is_shown_when_too_many_rows_wait_and_all_are_written_at_t
         path = f"{API}/patients/{v.patient}"
         async with clinic.client("viewer", raises=False) as client:
             with refusing(clinic, "disk_not_writable"):
-                before = v.rows()[0].seq
-                shown = [(await client.get(path)).status_code for _ in range(7)]
-                assert shown == [200] * 5 + [507] * 2
+                initial_seq = v.rows()[0].seq
+                visible_status_codes = [(await client.get(path)).status_code for _ in range(7)]
+                assert visible_status_codes == [200] * 5 + [507] * 2
                 wrong = await client.post(f"{API}/sign-in", json={"name": "viewer", "password": "wrong"})
                 assert wrong.status_code == 401
-                assert v.rows()[0].seq == before
+                assert v.rows()[0].seq == initial_seq
     async with open_clinic(tmp_path, min_free_bytes=0) as clinic:
         v.clinic = clinic
-        new = [(r.action, r.user_name) for r in v.rows() if r.seq > before]
+        new = [(r.action, r.user_name) for r in v.rows() if r.seq > initial_seq]
     assert new == [("patient.opened", "viewer")] * 5

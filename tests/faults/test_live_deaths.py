@@ -1,4 +1,4 @@
-"""What the tablet was told is kept is kept, however often the server is killed in the middle of a take."""
+"""Acknowledged batches survive any number of server kills during a trial."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ async def kill_again_and_again(
     chance = random.Random(5)  # noqa: S311 - when to kill
     for number in range(kills):
         if number % 2:  # in the stream; else it may be at its start, in a recovery or in the hello
-            told = len(report.ack_s)
-            while len(report.ack_s) == told:
+            count = len(report.ack_s)
+            while len(report.ack_s) == count:
                 await asyncio.sleep(0.01)
         await asyncio.sleep(chance.uniform(0.0, LONGEST_LIFE_S))
         if number % PER_FROZEN == 1:
@@ -77,11 +77,11 @@ async def kill_again_and_again(
             sent = report.sent
             while report.sent == sent:  # what is sent from now on it never reads
                 await asyncio.sleep(0.01)
-        told = len(report.ack_s)
+        count = len(report.ack_s)
         await asyncio.to_thread(server.kill)
-        kept = stored(path) if path.exists() else []
-        assert len(kept) >= told
-        assert kept == frames[: len(kept)]
+        retained = stored(path) if path.exists() else []
+        assert len(retained) >= count
+        assert retained == frames[: len(retained)]
         await asyncio.to_thread(server.start)
     over.set()
 
@@ -122,8 +122,8 @@ def test_fifty_kills_in_one_take_lose_no_acknowledged_batch(
     assert (report.sent, len(report.ack_s), report.problem) == (len(frames), len(frames), None)
     with clinic.db.read() as c:
         ended = live.get(c, take.id)
-        made = recordings.require_current(c, clinic.session.id)
+        current = recordings.require_current(c, clinic.session.id)
     assert (ended.state, ended.count, ended.problem) == ("finished", len(frames), None)
     assert ended.sha256 == report.sha256 == digest(frames)
-    (file,) = made.files
+    (file,) = current.files
     assert kept_in(clinic.blobs.read(clinic.patient.id, file.sha256)) == frames

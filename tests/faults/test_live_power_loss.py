@@ -17,7 +17,7 @@ HEAD = FILE_MARK + record("H", hello_json(HELLO))
 
 
 class Promises:
-    """What was promised when: (moment of the disk, batches acknowledged; -1 = the take itself)."""
+    """Guarantees over time: (moment of the disk, acknowledged batches; -1 = the trial itself)."""
 
     def __init__(self, disk: ModelDisk) -> None:
         self._disk = disk
@@ -81,15 +81,15 @@ def lost(path: Path, disk: ModelDisk, promises: Promises, monkeypatch: pytest.Mo
                 bad += promised >= 0
                 continue
             path.write_bytes(content)
-            kept: list[bytes] = []
-            log = segments.recover(path, lambda one: kept.append(one.body))  # noqa: B023
+            stored_chunks: list[bytes] = []
+            log = segments.recover(path, lambda one: stored_chunks.append(one.body))  # noqa: B023
             if log is None:
                 bad += promised >= 0
                 continue
             log.close()
-            assert kept[1:] == FRAMES[: len(kept) - 1]
-            assert path.read_bytes() == HEAD + b"".join(PIECES[: len(kept) - 1])
-            bad += len(kept) - 1 < promised
+            assert stored_chunks[1:] == FRAMES[: len(stored_chunks) - 1]
+            assert path.read_bytes() == HEAD + b"".join(PIECES[: len(stored_chunks) - 1])
+            bad += len(stored_chunks) - 1 < promised
     return bad
 
 
@@ -112,9 +112,9 @@ def test_a_power_cut_while_a_take_is_recovered_loses_nothing_either(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tail: bytes
 ) -> None:
     disk, path = ModelDisk(), tmp_path / "t.log"
-    found = HEAD + PIECES[0] + PIECES[1] + tail
-    disk.put(path, found)
-    path.write_bytes(found)
+    result = HEAD + PIECES[0] + PIECES[1] + tail
+    disk.put(path, result)
+    path.write_bytes(result)
     promises = Promises(disk)
     promises.make(2)
     monkeypatch.setattr(fs, "system", disk)

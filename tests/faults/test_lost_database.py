@@ -134,12 +134,12 @@ def test_a_start_is_refused_when_files_are_there_and_the_database_knows_no_patie
     elif database == "emptied":
         upgrade(full.settings.database_source)
     process = serve(full.settings)
-    _, said = process.communicate(timeout=120)
+    _, message = process.communicate(timeout=120)
     assert process.returncode == 1
-    assert "knows no patient" in said
-    assert "3 stored files and 0 live logs" in said
-    assert "sagittal accept" in said
-    assert "Traceback" not in said
+    assert "knows no patient" in message
+    assert "3 stored files and 0 live logs" in message
+    assert "sagittal accept" in message
+    assert "Traceback" not in message
     assert exists(full.settings.database_source) is (database != "missing")
     assert stored(full) == CONTENTS
 
@@ -210,9 +210,9 @@ def test_the_way_back_after_the_wrong_backup_was_accepted(
     assert "2 files in" in capsys.readouterr().out
     put(full, newest)
     assert sweep(full.db, full.blobs, at_once(full)) == 0  # another database than the accepted one
-    found = findings(full)
-    assert len([text for text in found if "sagittal trash --restore" in text]) == 2
-    assert any("another database" in text and "sagittal accept" in text for text in found)
+    result = findings(full)
+    assert len([text for text in result if "sagittal trash --restore" in text]) == 2
+    assert any("another database" in text and "sagittal accept" in text for text in result)
     assert command(full, "accept") == 0
     assert command(full, "trash", "--restore") == 0
     assert "2 files that the database refers to are back" in capsys.readouterr().out
@@ -248,12 +248,12 @@ def test_an_accepted_new_beginning_starts_and_keeps_the_old_files_for_thirty_day
 
 
 def test_the_mark_of_one_folder_does_not_trust_the_database_of_another(full: Clinic, tmp_path: Path) -> None:
-    other = tmp_path / "other.db"
-    copy_database(full.db.source, other)
-    with closing(Database(other)) as db, db.write() as c:
+    second = tmp_path / "other.db"
+    copy_database(full.db.source, second)
+    with closing(Database(second)) as db, db.write() as c:
         sessions.create(c, None, full.patient.id)
     assert sweep(full.db, full.blobs, at_once(full)) == 0
-    put(full, other)  # a continuation of ours: trusted
+    put(full, second)  # a continuation of ours: trusted
     with full.db.read() as c:
         assert custody.find_doubt(c, full.settings) is None
     raise_mark(full.db, full.settings.mark)
@@ -304,7 +304,7 @@ def test_a_crash_anywhere_in_a_move_to_the_trash_leaves_the_file_here_or_there(
 def test_a_power_cut_in_a_move_to_the_trash_leaves_the_whole_file_here_or_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    space, name, at = "a" * 32, "b" * 64, dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
+    space, name, timestamp = "a" * 32, "b" * 64, dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
     source = tmp_path / "blobs" / space / name
     trash = FolderTrash(tmp_path / "trash", tmp_path / "blobs")
     target = trash.root / "20260314T000000Z" / space / name
@@ -312,9 +312,9 @@ def test_a_power_cut_in_a_move_to_the_trash_leaves_the_whole_file_here_or_there(
     disk.put(source, b"walk")
     fs.make_folder(target.parent)
     monkeypatch.setattr(fs, "system", disk)
-    trash.take([(space, name)], at)
+    trash.take([(space, name)], timestamp)
     monkeypatch.setattr(trash, "write_list", lambda: None)
-    trash.settle([(space, name)], at)
+    trash.settle([(space, name)], timestamp)
     for states in disk.history:
         for state in states:
             assert [state.get(source), state.get(target)].count(b"walk") == 1
@@ -343,9 +343,9 @@ def test_a_file_in_the_trash_that_changed_is_found_by_the_check(full: Clinic) ->
     assert findings(full) == []
     trash = FolderTrash(full.settings.trash, full.settings.blobs)
     trash.path(next(trash.files())).write_bytes(b"of somebodi")
-    [found] = findings(full)
-    assert found.startswith("trash: ")
-    assert "has changed on the disk" in found
+    [result] = findings(full)
+    assert result.startswith("trash: ")
+    assert "has changed on the disk" in result
 
 
 # erasure is meant: nothing waits in the trash
@@ -367,8 +367,8 @@ def take_out(clinic: Clinic, name: str) -> None:
         recordings.remove_file(c, None, clinic.session.id, name)
 
 
-def erase(clinic: Clinic, what: str) -> None:
-    if what == "patient":
+def erase(clinic: Clinic, label: str) -> None:
+    if label == "patient":
         erasure.erase_patient(
             clinic.db, ReviewedAnalyses(clinic.blobs), clinic.settings, None, clinic.patient.id, confirm="P-1"
         )

@@ -31,16 +31,16 @@ async def test_a_restart_of_postgresql_costs_a_sentence_and_no_work(
                 waiting = clinic.submit()
                 until(reached.exists)
                 path = f"/api/v1/patients/{clinic.patient.id}"
-                before = (await client.get(path)).raise_for_status().json()
+                initial_body = (await client.get(path)).raise_for_status().json()
                 with stopped_server():
-                    away = [
+                    offset = [
                         await client.get(path),
                         await client.post("/api/v1/patients", json={"code": "P-2"}),
                     ]
                 gate.touch()
-                assert [answer.status_code for answer in away] == [503, 503]
-                assert {answer.json()["code"] for answer in away} == {"database_busy"}
-                assert (await client.get(path)).raise_for_status().json()["id"] == before["id"]
+                assert [answer.status_code for answer in offset] == [503, 503]
+                assert {answer.json()["code"] for answer in offset} == {"database_busy"}
+                assert (await client.get(path)).raise_for_status().json()["id"] == initial_body["id"]
                 added = await client.post("/api/v1/patients", json={"code": "P-2"})
                 assert added.status_code == 201
                 ended = [clinic.ended(view) for view in (held, waiting)]

@@ -42,8 +42,8 @@ def test_a_committed_row_always_has_its_whole_file(monkeypatch: pytest.MonkeyPat
 def test_a_name_never_shows_a_part_of_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
     disk = ModelDisk()
     publish(disk, monkeypatch, order="file first")
-    shown = {state.get(Path("/blobs/p/sha")) for moment in disk.history for state in moment}
-    assert shown == {None, CONTENT}
+    visible_responses = {state.get(Path("/blobs/p/sha")) for moment in disk.history for state in moment}
+    assert visible_responses == {None, CONTENT}
 
 
 @pytest.mark.death

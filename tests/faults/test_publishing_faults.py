@@ -23,7 +23,7 @@ from tests.helpers.marks import sqlite_only
 
 
 def fail_at_every_call(
-    monkeypatch: pytest.MonkeyPatch, act: Callable[[], bool], after: Callable[[bool], None]
+    monkeypatch: pytest.MonkeyPatch, act: Callable[[], bool], later: Callable[[bool], None]
 ) -> int:
     """Repeat `act` with the first, second … call failing until it passes; returns the number of failures."""
     failures = 0
@@ -31,7 +31,7 @@ def fail_at_every_call(
         monkeypatch.setattr(fs, "system", FailingSystem(failures + 1, errno.ENOSPC))
         passed = act()
         monkeypatch.setattr(fs, "system", fs.System())
-        after(passed)
+        later(passed)
         if passed:
             return failures
         failures += 1
@@ -98,10 +98,10 @@ def test_a_file_swept_before_its_row_was_written_is_noticed(clinic: Clinic) -> N
         clinic.db, clinic.blobs, clinic.settings, None, clinic.session.id, "b.txt"
     ) as upload:
         upload.write(b"content")
-        kept = upload._receiver.keep
+        stored_keep = upload._receiver.keep
 
         def keep_and_lose() -> object:
-            blob = kept()
+            blob = stored_keep()
             clinic.blobs.path(clinic.patient.id, blob.sha256).unlink()
             return blob
 

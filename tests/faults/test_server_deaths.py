@@ -54,8 +54,8 @@ def serving(clinic: Clinic) -> Iterator[tuple[subprocess.Popen[str], str]]:
         while address is None:
             line = process.stdout.readline()
             assert line, f"the server ended with {process.wait()}"
-            found = re.search(r"is at (http://\S+)", line)
-            address = found and found[1]
+            match = re.search(r"is at (http://\S+)", line)
+            address = match and match[1]
         yield process, address
     finally:
         process.kill()
@@ -150,9 +150,9 @@ def test_an_upload_in_parts_goes_on_after_kills_with_the_same_bytes(clinic: Clin
 def _dying(
     server: ForkedServer, content: bytes, start: int, kill_at: int | None, part: Path
 ) -> Iterator[bytes]:
-    """The bytes from a place on; the server is killed in the midst once what came before is there."""
-    for at in range(start, len(content), 250_000):
-        if kill_at and at >= kill_at:
+    """Bytes from a position on; kills the server midway once the earlier bytes are stored."""
+    for index in range(start, len(content), 250_000):
+        if kill_at and index >= kill_at:
             until(lambda: part.exists() and part.stat().st_size >= kill_at - 1_000_000)
             server.kill()
-        yield content[at : at + 250_000]
+        yield content[index : index + 250_000]

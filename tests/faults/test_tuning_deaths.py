@@ -1,4 +1,4 @@
-"""A tuning outlives its worker: it goes on from its checkpoint to the bits of an undisturbed one."""
+"""A tuning survives its worker: it resumes from a checkpoint with identical results."""
 
 from __future__ import annotations
 
@@ -36,20 +36,20 @@ TRIALS = {"fit": 60.0, "judge": 30.0}
 
 @pytest.fixture
 def tuning_clinic(tmp_path: Path) -> Iterator[Clinic]:
-    made = Clinic(tmp_path, lease_s=1.5)
-    made.settings = dataclasses.replace(
-        made.settings,
+    new_clinic = Clinic(tmp_path, lease_s=1.5)
+    new_clinic.settings = dataclasses.replace(
+        new_clinic.settings,
         task_modules=("sagittal.server.worker.tasks", "tests.faults.tiny_tasks"),
         job_timeout_s=60.0,
     )
     for name, seconds in TRIALS.items():
         with receiving.receive(
-            made.db, made.blobs, made.settings, None, made.session.id, f"{name}.npz"
+            new_clinic.db, new_clinic.blobs, new_clinic.settings, None, new_clinic.session.id, f"{name}.npz"
         ) as upload:
             upload.write(trial_bytes(seconds))
             upload.keep()
-    yield made
-    made.db.close()
+    yield new_clinic
+    new_clinic.db.close()
 
 
 @pytest.fixture
@@ -68,16 +68,16 @@ def submit(clinic: Clinic, **changes: Any) -> JobView:
 
 def result(clinic: Clinic) -> dict[str, Any]:
     with clinic.db.read() as c:
-        [found] = tunings.of_session(c, clinic.session.id)
-    return dict(found.result)
+        [results] = tunings.of_session(c, clinic.session.id)
+    return dict(results.result)
 
 
 @keep
 def undisturbed() -> dict[str, Any]:
-    """What the order gives in one go."""
+    """Result of the same order without interruption."""
     files = [SourceFile.of_bytes(f"{name}.npz", trial_bytes(seconds)) for name, seconds in TRIALS.items()]
-    found = tunings.prepare(files, ORDER).run(lambda *_: None).to_json()
-    return dict(json.loads(json.dumps(found)))
+    result = tunings.prepare(files, ORDER).run(lambda *_: None).to_json()
+    return dict(json.loads(json.dumps(result)))
 
 
 def kept(clinic: Clinic, view: JobView) -> str | None:
@@ -95,10 +95,10 @@ def test_a_killed_worker_costs_a_tuning_seconds_and_not_its_bits(
     os.kill(worker, signal.SIGKILL)
     step = json.loads(tuning_clinic.blobs.read(tuning_clinic.patient.id, first))["swarm"]["step"]
     assert step > 0
-    again = until(lambda: found if (found := kept(tuning_clinic, view)) != first else None)
+    second = until(lambda: found if (found := kept(tuning_clinic, view)) != first else None)
     assert tuning_clinic.row(view).attempt == 2
     assert until(lambda: tuning_clinic.row(view).message).startswith("Round ")
-    held = json.loads(tuning_clinic.blobs.read(tuning_clinic.patient.id, again))["swarm"]["step"]
+    held = json.loads(tuning_clinic.blobs.read(tuning_clinic.patient.id, second))["swarm"]["step"]
     assert held > step
     assert not tuning_clinic.blobs.path(tuning_clinic.patient.id, first).exists()
     assert tuning_clinic.ended(view, 300.0).state == "done"

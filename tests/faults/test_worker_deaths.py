@@ -124,17 +124,17 @@ def test_a_frozen_worker_is_fenced_when_it_wakes(clinic: Clinic, workers: Worker
     view, reached, gate = clinic.hold("third")
     until(reached.exists)
     [frozen] = workers.pids
-    other = Workers(clinic.settings)
+    second = Workers(clinic.settings)
     try:
         freeze_outside_a_transaction(clinic, frozen)
         reached.unlink()
-        other.start()
+        second.start()
         until(reached.exists)  # the second attempt is at the gate: the first one's lease has run out
         gate.touch()
         done = clinic.ended(view)
     finally:
         os.kill(frozen, signal.SIGCONT)
-    other.stop()
+    second.stop()
     assert (done.state, done.attempt) == ("done", 2)
     assert clinic.ended(clinic.submit()).state == "done"  # the woken one threw its result away and works on
     assert workers.pids == [frozen]
@@ -150,27 +150,27 @@ def test_a_worker_frozen_while_it_writes_stops_the_others_only_until_it_wakes(
     waiting = clinic.submit()
     until(reached.exists)
     [frozen] = workers.pids
-    other = Workers(clinic.settings)
-    said: list[str] = []
+    second = Workers(clinic.settings)
+    names: list[str] = []
 
     def has_said(words: str) -> bool:
-        said.append(capfd.readouterr().err)
-        return words in "".join(said)
+        names.append(capfd.readouterr().err)
+        return words in "".join(names)
 
     os.kill(frozen, signal.SIGSTOP)
     try:
-        other.start()
-        [patient] = other.pids
+        second.start()
+        [patient] = second.pids
         until(lambda: has_said("the database has been busy"))
         child = children_of(patient)
         gate.touch()
     finally:
         os.kill(frozen, signal.SIGCONT)
     assert [clinic.ended(one).state for one in (view, waiting)] == ["done", "done"]
-    assert (workers.pids, other.pids, children_of(patient)) == ([frozen], [patient], child)
-    other.stop()
+    assert (workers.pids, second.pids, children_of(patient)) == ([frozen], [patient], child)
+    second.stop()
     assert sorted(r.job_id for r in clinic.results()) == sorted([view.id, waiting.id])
-    assert "Traceback" not in "".join(said)
+    assert "Traceback" not in "".join(names)
 
 
 @on_both_engines
@@ -180,9 +180,9 @@ def test_cancel_stops_the_child_at_any_stage_within_two_seconds(clinic: Clinic, 
         view, reached, _ = clinic.hold(stage)
         child = int(until(lambda at=reached: at.exists() and at.read_text()))  # type: ignore[misc]
         with clinic.db.write() as c:
-            asked = clinic.queue.cancel(c, view.id)
-        assert asked is not None
-        assert (asked.state, asked.cancel_requested) == ("running", True)
+            requests = clinic.queue.cancel(c, view.id)
+        assert requests is not None
+        assert (requests.state, requests.cancel_requested) == ("running", True)
         assert clinic.ended(view, patience_s=2.0).state == "cancelled", stage
         assert not alive(child)
         assert clinic.results() == []

@@ -1,7 +1,7 @@
-"""A small real kind of job for the fault tests: it walks through stages and stops where its params say.
+"""A small real job type for fault tests: it passes through stages and stops as its params demand.
 
-params: hold_at (a stage, or "publish": waits there until `gate` exists, having made `reached`), die_at,
-error ("known", "bug", "memory"), spin (never ends, never speaks).
+params: hold_at (a stage, or "publish": waits for `gate` after creating `reached`), die_at, error ("known",
+"bug", "memory"), spin (never ends or reports).
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""The picture of the rooms in docs/reference/architecture.md: `python -m tests.helpers.architecture_page`.
+"""Generate the diagram of docs/reference/architecture.md: `python -m tests.helpers.architecture_page`.
 
-Rooms are the folders of core and server, and web and sagittal as a whole. An arrow is an import. One that
-follows from others is left out: where A imports B and B imports C, no arrow goes from A to C. What a room is
-for is the first sentence of its docstring. Modules beside the rooms (core/errors.py, server/main.py) have no
-box.
+Boxes are the folders of core and server, and web and sagittal as a whole, labelled with the first sentence of
+their docstring. Arrows are imports, without those implied by others. Top-level modules (core/errors.py,
+server/main.py) have no box.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ def find_arrows(root: Path = ROOT) -> set[tuple[str, str]]:
         (room, to)
         for room, targets in direct.items()
         for to in targets
-        if not any(to in _reached(direct, other) for other in targets - {to})
+        if not any(to in _reached(direct, second) for second in targets - {to})
     }
 
 
@@ -88,14 +87,14 @@ def _room_of(module: str) -> str:
 
 
 def _reached(direct: dict[str, set[str]], start: str) -> set[str]:
-    seen: set[str] = set()
+    observations: set[str] = set()
     left = list(direct[start])
     while left:
         room = left.pop()
-        if room not in seen:
-            seen.add(room)
+        if room not in observations:
+            observations.add(room)
             left += direct[room]
-    return seen
+    return observations
 
 
 def _first_sentence(path: Path) -> str:

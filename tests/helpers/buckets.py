@@ -1,4 +1,4 @@
-"""A bucket on 127.0.0.1: moto's S3 behind real HTTP, which tests stop and start."""
+"""S3 bucket on 127.0.0.1 (moto behind real HTTP) that tests can stop and start."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class S3Server:
             self._server = None
 
     def ask(self, method: str, path: str, content: bytes = b"") -> bytes:
-        """A request of somebody who needs no keys here."""
+        """Request without credentials."""
         with httpx.Client(trust_env=False) as client:
             return client.request(method, self.address + path, content=content).raise_for_status().content
 
 
 @dataclass
 class Bucket:
-    """An empty bucket of its own; the environment names its server."""
+    """Empty bucket; the environment names its server."""
 
     server: S3Server
     name: str
@@ -96,7 +96,7 @@ def bucket(s3_server: S3Server, monkeypatch: pytest.MonkeyPatch) -> Iterator[Buc
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setenv("AWS_ENDPOINT_URL", s3_server.address)
     monkeypatch.setattr(s3_bucket, "REST_S", 0.0)  # a server that was started again is asked at once
-    made = Bucket(s3_server, f"bucket-{next(_numbers)}")
-    s3_server.ask("PUT", f"/{made.name}")
-    yield made
+    result = Bucket(s3_server, f"bucket-{next(_numbers)}")
+    s3_server.ask("PUT", f"/{result.name}")
+    yield result
     s3_server.start()

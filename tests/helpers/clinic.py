@@ -32,7 +32,7 @@ CHEAP = PasswordHash((Argon2Hasher(time_cost=1, memory_cost=8, parallelism=1),))
 
 @functools.cache
 def password_hash() -> str:
-    """One hash for all test accounts; a sign-in costs what the hash that it is held against has cost."""
+    """One password hash for all test accounts, since hashing is slow."""
     return CHEAP.hash(PASSWORD)
 
 
@@ -77,9 +77,9 @@ class Clinic:
 
 @contextlib.asynccontextmanager
 async def open_clinic(folder: Path, **settings: Any) -> AsyncIterator[Clinic]:
-    """Start an application on a folder and stop it again; estimators only if `live_workers` says so.
+    """Start and later stop an application on a folder; estimators only with `live_workers`.
 
-    Its database is a file, or PostgreSQL's where the tests were started with `--engine postgresql`.
+    Its database is SQLite, or PostgreSQL with `--engine postgresql`.
     """
     defaults: dict[str, Any] = {"live_workers": 0, "database_url": choose_url(folder)}
     options = Settings(data_dir=folder, **{**defaults, **settings})

@@ -29,9 +29,9 @@ _lasting: dict[Path, str] = {}
 
 
 def choose_url(folder: Path) -> str:
-    """The `database_url` of a clinic on this folder: "" = a file in it; the same for who opens it again.
+    """`database_url` of a clinic on this folder ("" = SQLite file), the same on every call.
 
-    Skips the test where PostgreSQL is wanted and is not there.
+    Skips the test if PostgreSQL is requested but not installed.
     """
     if (_in_force or [_find_usual()])[-1] == "sqlite":
         return ""
@@ -49,13 +49,13 @@ def tell_commands(monkeypatch: pytest.MonkeyPatch, settings: Settings) -> None:
 
 
 def _find_usual() -> str:
-    """What `--engine` says; asked late, for this module is imported before the option is read."""
+    """Value of `--engine`, read lazily because this module is imported before the option is parsed."""
     return os.environ.get(ENGINE, "sqlite")
 
 
 @pytest.fixture(scope="module", autouse=True)
 def engine(request: pytest.FixtureRequest) -> Iterator[str]:
-    """What a clinic is on whose test names no database; a clinic that outlives a test must ask for it."""
+    """Default database of tests that name none; clinics shared between tests must request it."""
     _in_force.append(getattr(request, "param", _find_usual()))
     yield _in_force[-1]
     _in_force.pop()

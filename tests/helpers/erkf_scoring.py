@@ -27,9 +27,9 @@ class Score:
 
     Parameters
     ----------
-    hip, knee, ankle : (3,) flexion, adduction, rotation in degrees, as they are (not zeroed).
-    heading : of every sensor against the pelvis', degrees. drift : pelvis' heading, end minus start, degrees.
-    stride_bias, stride, width : mean, RMS and RMS in mm. residual : joint ends apart, mm, the worst joint.
+    hip, knee, ankle : (3,) flexion, adduction, rotation in degrees, not zeroed.
+    heading : per sensor against the pelvis, degrees. drift : pelvis heading, end minus start, degrees.
+    stride_bias, stride, width : mean, RMS and RMS in mm. residual : largest joint residual, mm.
     """
 
     hip: Floats
@@ -64,47 +64,56 @@ HEADER = [
 
 def score(take: Take, track: ErkfTrack, from_s: float = 12.0) -> Score:
     """Compare from a time on; `from_s` leaves out the standing start, where headings are not yet found."""
-    after, n = slice(round(from_s * take.rate_hz), None), len(track.q)
-    found = angles_of(take, track, zeroed=False)
+    final_window, n = slice(round(from_s * take.rate_hz), None), len(track.q)
+    result = angles_of(take, track, zeroed=False)
 
     def worst(name: str) -> float:
-        both = [found[f"{name}_{e}"][after] - take.truth.angles[f"{name}_{e}"][:n][after] for e in "rl"]
-        return max(rms(np.degrees(_wrap(e))) for e in both)
+        pair = [
+            result[f"{name}_{e}"][final_window] - take.truth.angles[f"{name}_{e}"][:n][final_window]
+            for e in "rl"
+        ]
+        return max(rms(np.degrees(_wrap(e))) for e in pair)
 
     q = take.tree.segment_q(track.q)
     off = np.stack([_wrap(yaw(q[:, i]) - yaw(take.truth.q[s][:n])) for i, s in enumerate(SEGMENTS)])
     strides, widths = steps(take, track, from_s)
     angles = {joint: np.array([worst(name) for name in names]) for joint, names in JOINTS.items()}
-    pelvis = np.degrees(np.unwrap(off[0])[after])
+    pelvis = np.degrees(np.unwrap(off[0])[final_window])
     return Score(
         hip=angles["hip"],
         knee=angles["knee"],
         ankle=angles["ankle"],
-        heading=rms(np.degrees(_wrap(off[1:] - off[0])[:, after])),
+        heading=rms(np.degrees(_wrap(off[1:] - off[0])[:, final_window])),
         stride_bias=float(1e3 * strides.mean()),
         stride=1e3 * rms(strides),
         width=1e3 * rms(widths),
         drift=float(pelvis[-1] - pelvis[0]),
-        residual=1e3 * max(rms(x) for x in track.joint_residual[after].T),
+        residual=1e3 * max(rms(x) for x in track.joint_residual[final_window].T),
     )
 
 
 def steps(take: Take, track: ErkfTrack, from_s: float) -> tuple[Floats, Floats]:
     """Found minus true length of each stride, and width between it and the other foot's stance in it, m."""
-    found = take.tree.segment_origin(track.p, track.q)
+    origin = take.tree.segment_origin(track.p, track.q)
     lengths, widths = [], []
     stances = {s: np.array([x.start_s for x in take.truth.strides if x.side == s]) for s in FOOT}
     for stride in take.truth.strides:
-        other = next(s for s in FOOT if s != stride.side)
-        inside = stances[other][(stances[other] > stride.start_s) & (stances[other] < stride.end_s)]
+        other_item = next(s for s in FOOT if s != stride.side)
+        inside = stances[other_item][
+            (stances[other_item] > stride.start_s) & (stances[other_item] < stride.end_s)
+        ]
         times = np.array([stride.start_s, stride.end_s, *inside[:1]]) + FLAT_S
         k = np.round(times * take.rate_hz).astype(int)
-        if stride.start_s < from_s or k.max() >= len(found):
+        if stride.start_s < from_s or k.max() >= len(origin):
             continue
-        here, there = FOOT[stride.side], FOOT[other]
-        true = [take.truth.p[here][k[0]], take.truth.p[here][k[1]], *(take.truth.p[there][x] for x in k[2:])]
-        i, j = SEGMENTS.index(here), SEGMENTS.index(there)
-        ours = [found[k[0], i], found[k[1], i], *(found[x, j] for x in k[2:])]
+        place, target = FOOT[stride.side], FOOT[other_item]
+        true = [
+            take.truth.p[place][k[0]],
+            take.truth.p[place][k[1]],
+            *(take.truth.p[target][x] for x in k[2:]),
+        ]
+        i, j = SEGMENTS.index(place), SEGMENTS.index(target)
+        ours = [origin[k[0], i], origin[k[1], i], *(origin[x, j] for x in k[2:])]
         lengths.append(_length(ours) - _length(true))
         if len(inside):
             widths.append(_width(ours) - _width(true))
@@ -118,8 +127,8 @@ def largest(scores: list[Score]) -> Score:
         values = np.array([getattr(s, name) for s in scores])
         return np.asarray(np.take_along_axis(values, np.abs(values).argmax(axis=0)[None], axis=0)[0])
 
-    alone = {f.name: float(of(f.name)) for f in fields(Score) if f.name not in JOINTS}
-    return Score(of("hip"), of("knee"), of("ankle"), **alone)
+    single_by_name = {f.name: float(of(f.name)) for f in fields(Score) if f.name not in JOINTS}
+    return Score(of("hip"), of("knee"), of("ankle"), **single_by_name)
 
 
 def rms(x: Floats) -> float:

@@ -31,11 +31,11 @@ class Score:
         return 1e3 * float(np.std(self.errors, ddof=1))
 
 
-def match(found: Sequence[float], reference: Sequence[float], window_s: float = WINDOW_S) -> Score:
+def match(result: Sequence[float], reference: Sequence[float], window_s: float = WINDOW_S) -> Score:
     """Pair each reference with the nearest found event within the window, nearest pairs first."""
     pairs = sorted(
         (abs(f - r), i, j)
-        for i, f in enumerate(found)
+        for i, f in enumerate(result)
         for j, r in enumerate(reference)
         if abs(f - r) <= window_s
     )
@@ -45,6 +45,6 @@ def match(found: Sequence[float], reference: Sequence[float], window_s: float = 
         if i not in taken_found and j not in taken_reference:
             taken_found.add(i)
             taken_reference[j] = i
-    errors = np.array([found[i] - reference[j] for j, i in sorted(taken_reference.items())])
-    extra = tuple(f for i, f in enumerate(found) if i not in taken_found)
+    errors = np.array([result[i] - reference[j] for j, i in sorted(taken_reference.items())])
+    extra = tuple(f for i, f in enumerate(result) if i not in taken_found)
     return Score(errors, len(reference) - len(errors), extra)

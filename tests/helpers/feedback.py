@@ -16,7 +16,7 @@ OPEN = Baseline(mean=0.40, sd=0.03, n=40, session_id="before")
 
 @dataclass(frozen=True)
 class Walked:
-    """A stride as the live chain tells it."""
+    """Stride as reported by the live chain."""
 
     n: int
     side: Side = "left"
@@ -31,8 +31,8 @@ class Walked:
 def walked(n: int, value: float | None, side: Side = "left", **changes: Any) -> Walked:
     """A stride of a second, the n-th of its side."""
     start = n * 0.5
-    made = Walked(n, side, start, start + 1.0, start + 1.1, {NAME: value})
-    return replace(made, **changes)
+    result = Walked(n, side, start, start + 1.0, start + 1.1, {NAME: value})
+    return replace(result, **changes)
 
 
 def prescription(**changes: Any) -> Prescription:
@@ -51,10 +51,10 @@ def prescription(**changes: Any) -> Prescription:
 
 
 def train(
-    values: Iterable[float], given: Prescription | None = None, baseline: Baseline = OPEN
+    values: Iterable[float], inputs: Prescription | None = None, baseline: Baseline = OPEN
 ) -> tuple[list[Cue], FeedbackEngine]:
     """Walk with these values of the left side."""
-    engine = FeedbackEngine(prescription() if given is None else given, baseline)
+    engine = FeedbackEngine(prescription() if inputs is None else inputs, baseline)
     cues = []
     for n, value in enumerate(values):
         cue = engine.push(walked(2 * n, value))

@@ -1,8 +1,8 @@
-"""Find takes on which parameters matter: `python -m tests.helpers.find_parameter_changes [take[:stage,…] …]`.
+"""Find trials that depend on parameters: `python -m tests.helpers.find_parameter_changes [take[:stage,…] …]`
 
-Writes a line of `tests/helpers/pipeline_parameters.csv` for every parameter that has none and moves
-something. A line may as well be written by hand: parameter, take (tests/helpers/parameter_takes.py), stage,
-other value as JSON; the sweep of tests/core/pipeline/test_config.py says whether it holds.
+Adds a line to `tests/helpers/pipeline_parameters.csv` for each parameter that has none and changes a result.
+Lines can also be written by hand: parameter, trial (tests/helpers/parameter_takes.py), stage, other value as
+JSON; the sweep of tests/core/pipeline/test_config.py verifies them.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def noting_reads(config: PipelineConfig) -> Iterator[set[str]]:
         names[id(value)] = path
         kinds.add(type(value))
         for f in dataclasses.fields(value):
-            below = getattr(value, f.name)
-            if dataclasses.is_dataclass(below):
-                name(below, f"{path}.{f.name}".removeprefix("."))
+            lower = getattr(value, f.name)
+            if dataclasses.is_dataclass(lower):
+                name(lower, f"{path}.{f.name}".removeprefix("."))
 
     name(config, "")
     read: set[str] = set()
@@ -81,14 +81,14 @@ def find_reads(take: StagedTake | DirectCall, stage: str) -> set[str]:
 
 
 def find_change(take: StagedTake | DirectCall, stage: str, parameter: Parameter) -> object | None:
-    """The nearest other value that changes what the stage gives; None = the furthest do not."""
+    """Nearest other value that changes the stage's result; None if even the furthest does not."""
     changes = list_changes(parameter)
     quiet = 0
     for new in reversed(changes):
-        told = _tells(take, stage, parameter, new)
-        if told:
+        tells = _tells(take, stage, parameter, new)
+        if tells:
             return next(new for new in changes if _tells(take, stage, parameter, new))
-        quiet += told is not None
+        quiet += tells is not None
         if quiet == FURTHEST and isinstance(new, float):
             break
     return None
@@ -99,10 +99,10 @@ def _tells(take: StagedTake | DirectCall, stage: str, parameter: Parameter, new:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            seen = take.observe(stage, replace_value(take.config, parameter.path, new))
+            observe = take.observe(stage, replace_value(take.config, parameter.path, new))
     except Exception:  # noqa: BLE001  a value beyond what the stage can work with shows nothing
         return None
-    return seen != take.observe_usual(stage)
+    return observe != take.observe_usual(stage)
 
 
 def search(names: list[str]) -> None:
@@ -118,7 +118,7 @@ def search(names: list[str]) -> None:
             continue
         new_rows = []
         for stage in only.split(",") if only else stages:
-            read, missing, found = find_reads(take, stage), [], 0
+            read, missing, outcome = find_reads(take, stage), [], 0
             for parameter in list_parameters():
                 if parameter.name in rows or parameter.name.partition("[")[0] not in read:
                     continue
@@ -128,9 +128,9 @@ def search(names: list[str]) -> None:
                     continue
                 new_rows.append(Row(parameter.name, name, stage, new))
                 rows[parameter.name] = new_rows[-1]
-                found += 1
-            if found or missing:
-                print(f"{name} {stage}: {found} found, unmoved: {' '.join(missing)}", flush=True)
+                outcome += 1
+            if outcome or missing:
+                print(f"{name} {stage}: {outcome} found, unmoved: {' '.join(missing)}", flush=True)
         write_rows({row.parameter: row for row in (*read_rows(), *new_rows)}.values())
 
 

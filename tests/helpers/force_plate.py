@@ -49,8 +49,8 @@ def take() -> tuple[Orientations, FootMovement, Floats, Floats]:
             speed.append(np.full(JOIN, speed[-1][-1]))
             acc.append(np.repeat(acc[-1][-1:], JOIN, axis=0))
             first += JOIN
-        for j, found in ((up, contact), (down, off)):
-            found.append((first + j + (CONTACT_N - force[j]) / (force[j + 1] - force[j])) / RATE)
+        for j, result in ((up, contact), (down, off)):
+            result.append((first + j + (CONTACT_N - force[j]) / (force[j + 1] - force[j])) / RATE)
         pitch.append(turned)
         speed.append(np.linalg.norm(rate, axis=1))
         acc.append(np.stack([part[f"acc_{a}"] for a in "xyz"], axis=1))

@@ -1,4 +1,4 @@
-"""What a clinician would read off a walk, from its truth: medians over the steady strides of one side."""
+"""Clinical gait features from ground truth: medians over the steady strides of one side."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def features(truth: WalkTruth, side: Side) -> Features:
     foot = truth.p[FOOT[side]][:, :2]
     pitch = np.degrees(np.arcsin(rotate(truth.q[FOOT[side]], np.array([1.0, 0.0, 0.0]))[:, 2]))
 
-    def median(of: Callable[[TrueStride], float]) -> float:
-        return float(np.median([of(s) for s in strides]))
+    def median(source: Callable[[TrueStride], float]) -> float:
+        return float(np.median([source(s) for s in strides]))
 
     def within(start: float, stop: float) -> slice:
         return slice(*np.searchsorted(t, (start, stop)).tolist())

@@ -61,7 +61,7 @@ def block_mean(name: str) -> Floats:
 
 
 def recording_of(x: Floats, rate_hz: float) -> Recording:
-    """A table as the product reads it; only the manifest tells it about the file."""
+    """Recording read from a table whose format only the manifest defines."""
     name = "feet.csv"
     data = "\n".join([",".join(COLUMNS), *(",".join(f"{v:.9g}" for v in row) for row in x)]).encode()
     columns = {
@@ -79,7 +79,7 @@ def recording_of(x: Floats, rate_hz: float) -> Recording:
 
 @keep_recorded
 def analysed() -> TakeAnalysis:
-    """What the product makes of the first copy."""
+    """Analysis of the first recording."""
     return analyse(recording_of(signals(COPIES[0]), RATE))
 
 
@@ -114,11 +114,11 @@ def true_strides(side: Side) -> tuple[TrueStride, ...]:
     along = foot["TOE"] - foot["FCC"]
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     t = np.arange(len(mean)) / MOCAP_RATE
-    found = []
+    result = []
     for row in reference_strides(side):
         times = float(row["start"]) / RATE, float(row["end"]) / RATE
         a, b = (np.array([np.interp(s, t, c) for c in (*mean.T, heading)]) for s in times)
         length = float(np.linalg.norm(b[:2] - a[:2]))
         contacts = float(row["pre_ic"]) / RATE, float(row["ic"]) / RATE
-        found.append(TrueStride(*times, length, bool(abs(b[2] - a[2]) > TURNING), *contacts))
-    return tuple(found)
+        result.append(TrueStride(*times, length, bool(abs(b[2] - a[2]) > TURNING), *contacts))
+    return tuple(result)

@@ -1,6 +1,6 @@
-"""ipol_walks for tests: 22 walks there and back of four healthy adults, with events that people checked.
+"""ipol_walks for tests: 22 walks of four healthy adults with manually checked events.
 
-The sensors' packet counter is the clock: packets were lost, and a row says nothing about its time.
+The packet counter is the clock: packets were lost, so row numbers are not times.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ WALKS: Final = tuple(
 
 @dataclass(frozen=True, eq=False)
 class CheckedEvents:
-    """What people say of one walk, all in s on the counter's clock.
+    """Manually checked events of one walk, in s on the counter's clock.
 
     Parameters
     ----------
@@ -67,18 +67,18 @@ def ipol_recording(walk: str, *segments: Segment) -> Recording:
     folder = data_folder("ipol_walks")
     files = [SourceFile.of_path(path) for path in sorted(folder.glob(f"{walk}_*.txt"))]
     whole, height_cm = read_recording(files, parse_manifest(ipol_manifest())), _said(walk)["Height"]
-    worn = segments or tuple(s for s in whole.segments.values() if s is not None)
+    segment_names = segments or tuple(s for s in whole.segments.values() if s is not None)
     return replace(
         whole,
-        streams={d: x for d, x in whole.streams.items() if whole.segments[d] in worn},
-        segments={d: s for d, s in whole.segments.items() if s in worn},
+        streams={d: x for d, x in whole.streams.items() if whole.segments[d] in segment_names},
+        segments={d: s for d, s in whole.segments.items() if s in segment_names},
         subject=Subject(height_m=height_cm / 100.0 if np.isfinite(height_cm) else None),
     )
 
 
 @keep_recorded
 def ipol_analysis(walk: str, *segments: Segment) -> TakeAnalysis:
-    """What the product makes of it."""
+    """Analysis of a walk."""
     return analyse(ipol_recording(walk, *segments))
 
 
@@ -89,16 +89,18 @@ def first_s(recording: Recording) -> float:
 
 @cache
 def _said(walk: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(data_folder("ipol_walks", f"{walk}.json").read_text())
-    return found
+    fields: dict[str, Any] = json.loads(data_folder("ipol_walks", f"{walk}.json").read_text())
+    return fields
 
 
 @cache
 def checked_events(walk: str) -> CheckedEvents:
-    """What people say of one walk."""
-    said = _said(walk)
-    pairs = {side: np.array(said[f"{side.capitalize()}FootEvents"], np.float64) / RATE for side in SIDES}
-    turn, whole = (np.array(said[name], np.float64) / RATE for name in ("UTurnBoundaries", "TrialBoundaries"))
+    """Manually checked events of one walk."""
+    message = _said(walk)
+    pairs = {side: np.array(message[f"{side.capitalize()}FootEvents"], np.float64) / RATE for side in SIDES}
+    turn, whole = (
+        np.array(message[name], np.float64) / RATE for name in ("UTurnBoundaries", "TrialBoundaries")
+    )
     return CheckedEvents(
         contacts={side: x[:, 1] for side, x in pairs.items()},
         leavings={side: x[:, 0] for side, x in pairs.items()},

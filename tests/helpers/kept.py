@@ -34,7 +34,7 @@ FORGOTTEN_S: Final = 24 * 3600.0
 
 
 def view(content: dict[object, object]) -> MappingProxyType[object, object]:
-    """A mapping that nobody can change, as its pickle makes it again."""
+    """Read-only mapping restored from its pickle."""
     return MappingProxyType(content)
 
 
@@ -42,53 +42,52 @@ copyreg.pickle(MappingProxyType, lambda seen: (view, (dict(seen),)))
 
 
 def keep(make: Callable[P, R]) -> Callable[P, R]:
-    """Keep what a function gives for its arguments, the last in this process and all on disk.
+    """Cache a function's results by its arguments, the last in memory and all on disk.
 
     Parameters
     ----------
-    make : gives the same for the same arguments, and reads no recording; what it gives is never changed, and
-        can be pickled.
+    make : deterministic, reads no recordings; its result is picklable and never modified.
     """
     return _keep(make, "")
 
 
 def keep_recorded(make: Callable[P, R]) -> Callable[P, R]:
-    """As `keep`, of what a function makes of real recordings: others, or none, have values of their own."""
+    """As `keep`, for results from real recordings, which are part of the key."""
     return _keep(make, os.environ.get("SAGITTAL_DATA", ""))
 
 
 def keep_served(make: Callable[P, R]) -> Callable[P, R]:
-    """As `keep`, of what a server wrote: other sources of the server have values of their own."""
+    """As `keep`, for files written by a server, whose sources are part of the key."""
     return _keep(make, hash_sources(SERVER))
 
 
 def _keep(make: Callable[P, R], depends_on: str) -> Callable[P, R]:
     @functools.lru_cache(IN_MEMORY)
     def kept(*args: P.args, **kwargs: P.kwargs) -> R:
-        said = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{depends_on}"
-        path = folder() / hashlib.sha256(said.encode()).hexdigest()[:32]
+        message = f"{make.__module__}.{make.__qualname__}{args}{sorted(kwargs.items())}{depends_on}"
+        path = folder() / hashlib.sha256(message.encode()).hexdigest()[:32]
         with locked(path.with_suffix(".lock")):
             if not path.exists():
-                made = make(*args, **kwargs)
+                recording = make(*args, **kwargs)
                 part = path.with_suffix(".part")
-                part.write_bytes(pickle.dumps(made, pickle.HIGHEST_PROTOCOL))
+                part.write_bytes(pickle.dumps(recording, pickle.HIGHEST_PROTOCOL))
                 part.rename(path)
-                return made
-        found: R = pickle.loads(path.read_bytes())  # noqa: S301  written by this user's tests
-        return found
+                return recording
+        result: R = pickle.loads(path.read_bytes())  # noqa: S301  written by this user's tests
+        return result
 
     return functools.wraps(make)(kept)  # type: ignore[return-value]
 
 
 @functools.cache
 def folder() -> Path:
-    """Where the tests of these sources keep; made, and what is forgotten beside it removed."""
+    """Cache folder of the current sources; created on demand, outdated ones are removed."""
     FOLDER.mkdir(mode=0o700, exist_ok=True)
     if FOLDER.stat().st_uid != os.getuid():
         raise PermissionError(f"{FOLDER} belongs to somebody else; set TMPDIR to a folder of your own")
-    for other in FOLDER.iterdir():
-        if time.time() - other.stat().st_mtime > FORGOTTEN_S:
-            shutil.rmtree(other, ignore_errors=True)
+    for other_path in FOLDER.iterdir():
+        if time.time() - other_path.stat().st_mtime > FORGOTTEN_S:
+            shutil.rmtree(other_path, ignore_errors=True)
     mine = FOLDER / hash_sources(SOURCES)
     mine.mkdir(exist_ok=True)
     return mine

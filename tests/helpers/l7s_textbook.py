@@ -1,4 +1,4 @@
-"""The L7S step in 27 × 27 matrices, equation by equation: what the compiled step is held against."""
+"""L7S step with 27 × 27 matrices, equation by equation, as a reference for the compiled step."""
 
 from __future__ import annotations
 
@@ -109,8 +109,8 @@ class Textbook:
             H = np.zeros(27)
             for b, share in enumerate(self.shares):
                 H[6 * b : 6 * b + 3] = share * self.R[b][axis]
-            between = self.p[0] - 0.5 * self.p[1] - 0.5 * self.p[2]
-            rows.append((H, -float(between[axis]), self.params.mid_pelvis))
+            gap = self.p[0] - 0.5 * self.p[1] - 0.5 * self.p[2]
+            rows.append((H, -float(gap[axis]), self.params.mid_pelvis))
         H = np.zeros(27)
         H[:3] = self.R[0][2]
         rows.append((H, self.model.hip_height - float(self.p[0, 2]), self.params.pelvis_height))

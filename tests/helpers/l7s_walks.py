@@ -1,7 +1,7 @@
-"""Simulated walks for L7S with their truth, and its scores against it as Sy 2021 §III-B defines them.
+"""Simulated walks for L7S with ground truth, and scores after Sy 2021 §III-B.
 
-Sensors sit on skin, are mounted at random and have the errors of docs/science/simulation.md. Calibration,
-orientations and stillness come from the signals alone; only the body's lengths are known, as in the paper.
+Sensors are on skin, randomly oriented, with the errors of docs/science/simulation.md. Calibration,
+orientations and stillness come from the signals; only body lengths are known, as in the paper.
 """
 
 from __future__ import annotations
@@ -75,23 +75,23 @@ class Trial:
     steps: Mapping[Side, Bools]
     truth: WalkTruth
 
-    def run(self, worn: Worn, adjoint: Adjoint = "printed", body: BodyModel | None = None) -> Poses:
+    def run(self, segments: Worn, adjoint: Adjoint = "printed", body: BodyModel | None = None) -> Poses:
         """The filter on it, which is what Sy 2021 describes and what live shows."""
         body = body or self.truth.body
         params = L7sParams(adjoint=adjoint)
         return l7s_poses(
-            self.orientations, self.acceleration, self.steps, body, params, worn, both_ways=False
+            self.orientations, self.acceleration, self.steps, body, params, segments, both_ways=False
         )
 
 
 def steps_of(calibrated: CalibratedRecording) -> dict[Side, Bools]:
     """Where each foot rests, by the rule on its own signals."""
-    found: dict[Side, Bools] = {}
+    result: dict[Side, Bools] = {}
     for side in SIDES:
         x = calibrated.recording.sensors[FOOT[side]]
         gyr = x.gyr - calibrated.calibration.segments[FOOT[side]].gyro_bias
-        found[side] = still_samples(x.acc, gyr, x.valid, calibrated.recording.rate_hz, FOOT_STILL)
-    return found
+        result[side] = still_samples(x.acc, gyr, x.valid, calibrated.recording.rate_hz, FOOT_STILL)
+    return result
 
 
 def trial_of(recording: UniformRecording, truth: WalkTruth) -> Trial:
@@ -113,18 +113,18 @@ def trial(movement: str, height_m: float, seed: int) -> Trial:
     return trial_of(synchronise(take.recording), take.truth)
 
 
-def turned_headings(of: Trial, by_deg: Mapping[Segment, float]) -> Trial:
+def turned_headings(source: Trial, by_deg: Mapping[Segment, float]) -> Trial:
     """The same take with some sensors' headings off by these degrees, left positive."""
-    q, acceleration = dict(of.orientations.q), dict(of.acceleration)
+    q, acceleration = dict(source.orientations.q), dict(source.acceleration)
     for segment, degrees in by_deg.items():
         turn = about(2, radians(degrees))
         q[segment] = multiply(turn, q[segment])
         acceleration[segment] = rotate(turn, acceleration[segment][:])
-    return replace(of, orientations=replace(of.orientations, q=q), acceleration=acceleration)
+    return replace(source, orientations=replace(source.orientations, q=q), acceleration=acceleration)
 
 
 def straight_cycles(truth: WalkTruth) -> list[tuple[Side, float, float]]:
-    """Side, start and end in s of the strides straight ahead, without the short ones beside standing."""
+    """Side, start and end in s of straight strides, without the short ones next to standing."""
     typical = float(np.median([s.length_m for s in truth.strides]))
     return [
         (s.side, s.start_s, s.end_s)
@@ -137,40 +137,40 @@ def raw_angles(poses: Poses, calibrated: CalibratedRecording) -> dict[str, Float
     """Angles (n,) by name in degrees, not zeroed."""
     q = dict(poses.q)
     posed = Orientations(poses.t_s, poses.rate_hz, q, dict.fromkeys(q, np.ones_like(poses.valid)), "")
-    found = measure_angles(posed, calibrated.calibration.zero)
-    return {name: np.degrees(x + found.zero_offset[name]) for name, x in found.angles.items()}
+    angles = measure_angles(posed, calibrated.calibration.zero)
+    return {name: np.degrees(x + angles.zero_offset[name]) for name, x in angles.angles.items()}
 
 
-def cycle_scores(of: Trial, poses: Poses) -> Floats:
+def cycle_scores(source: Trial, poses: Poses) -> Floats:
     """RMSE in ° (offset removed) and correlation (cycles, 3, 2) of the straight gait cycles of both legs."""
-    found, rate = raw_angles(poses, of.calibrated), poses.rate_hz
+    result, rate = raw_angles(poses, source.calibrated), poses.rate_hz
     scores = []
-    for side, start_s, end_s in straight_cycles(of.truth):
+    for side, start_s, end_s in straight_cycles(source.truth):
         part = slice(round(start_s * rate), round(end_s * rate))
-        scores.append([_score(found, of.truth, f"{name}_{SUFFIX[side]}", part) for name in FLEXION])
+        scores.append([_score(result, source.truth, f"{name}_{SUFFIX[side]}", part) for name in FLEXION])
     return np.array(scores)
 
 
-def trial_scores(of: Trial, poses: Poses) -> Floats:
+def trial_scores(source: Trial, poses: Poses) -> Floats:
     """The same (3, 2) over everything between the first and the last standing, mean of the legs."""
-    found, rate, stands = raw_angles(poses, of.calibrated), poses.rate_hz, of.truth.stands
+    result, rate, stands = raw_angles(poses, source.calibrated), poses.rate_hz, source.truth.stands
     part = slice(round(stands[0][1] * rate), round(stands[-1][0] * rate))
-    scores = [[_score(found, of.truth, f"{n}_{e}", part) for n in FLEXION] for e in "lr"]
+    scores = [[_score(result, source.truth, f"{n}_{e}", part) for n in FLEXION] for e in "lr"]
     return np.asarray(np.mean(scores, axis=0))
 
 
-def _score(found: Mapping[str, Floats], truth: WalkTruth, name: str, part: slice) -> tuple[float, float]:
-    a, b = found[name][part], np.degrees(truth.angles[name][part])
+def _score(result: Mapping[str, Floats], truth: WalkTruth, name: str, part: slice) -> tuple[float, float]:
+    a, b = result[name][part], np.degrees(truth.angles[name][part])
     return float((a - b).std()), float(np.corrcoef(a, b)[0, 1])
 
 
-def pose_errors(of: Trial, poses: Poses) -> tuple[float, float]:
-    """e_pos in cm of hips, knees and ankles from mid-pelvis, e_ori in ° of the segments without a sensor.
+def pose_errors(source: Trial, poses: Poses) -> tuple[float, float]:
+    """e_pos in cm of hips, knees and ankles from mid-pelvis, e_ori in ° of segments without a sensor.
 
-    Sy 2021 eq 45 and 46 (with the transpose that print lost) between the first and the last standing. Our
-    world has a heading of its own, so it is turned by the mean difference of the feet's.
+    Sy 2021 eq 45 and 46 (with the transpose missing in print) between first and last standing, after aligning
+    the mean heading of the feet.
     """
-    rate, stands, truth = poses.rate_hz, of.truth.stands, of.truth
+    rate, stands, truth = poses.rate_hz, source.truth.stands, source.truth
     part = slice(round(stands[0][1] * rate), round(stands[-1][0] * rate))
     apart = np.concatenate([_heading(truth.q[s][part]) - _heading(poses.q[s][part]) for s in FOOT.values()])
     turn = about(2, float(np.angle(np.exp(1j * apart).mean())))
@@ -195,15 +195,19 @@ def _heading(q: Floats) -> Floats:
     return np.asarray(np.arctan2(forward[:, 1], forward[:, 0]))
 
 
-def edges(of: Trial, side: Side) -> np.ndarray:
+def edges(source: Trial, side: Side) -> np.ndarray:
     """First flagged sample of the foot's rest after each of its contacts: the paper's edges of step flags."""
-    contacts, step, rate = of.truth.contacts[side], of.steps[side], of.calibrated.recording.rate_hz
-    found = []
+    contacts, step, rate = (
+        source.truth.contacts[side],
+        source.steps[side],
+        source.calibrated.recording.rate_hz,
+    )
+    result = []
     for contact, release in zip(contacts.contact, np.append(contacts.release[1:], np.inf), strict=True):
         first, last = round(contact * rate), round(min(release * rate, len(step)))
         rests = np.flatnonzero(step[first:last])
-        found += [first + rests[0]] if len(rests) else []
-    return np.array(found)
+        result += [first + rests[0]] if len(rests) else []
+    return np.array(result)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +224,10 @@ class Strides:
         return float(self.found.sum() / self.true.sum() - 1.0)
 
 
-def strides_of(of: Trial, poses: Poses, side: Side) -> Strides:
+def strides_of(source: Trial, poses: Poses, side: Side) -> Strides:
     """Distances of the ankle in the floor's plane between edges of step flags (Sy 2021 §III-B.3)."""
-    k, foot = edges(of, side), FOOT[side]
-    found, true = (np.linalg.norm(np.diff(p[foot][k, :2], axis=0), axis=1) for p in (poses.p, of.truth.p))
-    return Strides(found, true, np.diff(k) / poses.rate_hz)
+    k, foot = edges(source, side), FOOT[side]
+    result, true = (
+        np.linalg.norm(np.diff(p[foot][k, :2], axis=0), axis=1) for p in (poses.p, source.truth.p)
+    )
+    return Strides(result, true, np.diff(k) / poses.rate_hz)

@@ -29,7 +29,7 @@ Samples = NDArray[np.float32]
 
 @dataclass(frozen=True, eq=False)
 class LiveTake:
-    """What a tablet sent."""
+    """Messages of a tablet."""
 
     hello: Hello
     batches: tuple[SampleBatch, ...]
@@ -54,9 +54,11 @@ class LiveTake:
         for b in self.batches:
             rate = self.hello.stream(b.stream).rate_hz
             for i in range(0, len(b.samples), n):
-                at = round(i * 1e6 / rate) if b.offsets_us is None else int(b.offsets_us[i])
+                position = round(i * 1e6 / rate) if b.offsets_us is None else int(b.offsets_us[i])
                 offsets = None if b.offsets_us is None else b.offsets_us[i : i + n] - b.offsets_us[i]
-                parts.append(replace(b, t0_us=b.t0_us + at, samples=b.samples[i : i + n], offsets_us=offsets))
+                parts.append(
+                    replace(b, t0_us=b.t0_us + position, samples=b.samples[i : i + n], offsets_us=offsets)
+                )
         return LiveTake(self.hello, tuple(replace(b, seq=k) for k, b in enumerate(parts)))
 
 
@@ -92,20 +94,20 @@ def sensor_samples(stream: ImuStream) -> Samples:
 def shared(
     recording: Recording, start_us: int = 1_000_000, number: int = 0, clock: Clock = "shared"
 ) -> Device:
-    """All worn sensors of a recording on one clock; a row that a sensor does not have is NaN."""
-    worn = [(d, s) for d, s in recording.segments.items() if s is not None]
-    rate = recording.streams[worn[0][0]].rate_hz
-    rows = {d: np.rint(recording.streams[d].t_s * rate).astype(np.int64) for d, _ in worn}
+    """All sensors of a recording on one clock; missing rows are NaN."""
+    segments = [(d, s) for d, s in recording.segments.items() if s is not None]
+    rate = recording.streams[segments[0][0]].rate_hz
+    rows = {d: np.rint(recording.streams[d].t_s * rate).astype(np.int64) for d, _ in segments}
     ticks = np.unique(np.concatenate(list(rows.values())))
-    samples = np.full((len(ticks), len(worn), 9), np.nan, np.float32)
-    for i, (d, _) in enumerate(worn):
+    samples = np.full((len(ticks), len(segments), 9), np.nan, np.float32)
+    for i, (d, _) in enumerate(segments):
         samples[np.searchsorted(ticks, rows[d]), i] = sensor_samples(recording.streams[d])
-    info = StreamInfo(number, rate, clock, tuple(SensorInfo(d, s) for d, s in worn))
+    info = StreamInfo(number, rate, clock, tuple(SensorInfo(d, s) for d, s in segments))
     return Device(info, start_us + np.rint((ticks - ticks[0]) * 1e6 / rate).astype(np.int64), samples)
 
 
 def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake:
-    """Batches of up to n samples in order of sending; a hole that no offsets tell begins a new batch."""
+    """Batches of up to n samples in sending order; a gap without offsets starts a new batch."""
     sent: list[tuple[int, int, SampleBatch]] = []
     for d in devices:
         step = 1e6 / d.info.rate_hz
@@ -114,10 +116,10 @@ def send(devices: Sequence[Device], n: int = 10, take: str = "take") -> LiveTake
         for first, past in zip([0, *holes], [*holes, len(d.t_us)], strict=True):
             for a in range(first, past, n):
                 b = min(a + n, past)
-                at = int(true_us[b - 1]) + d.delay_us
+                position = int(true_us[b - 1]) + d.delay_us
                 offsets = (d.t_us[a:b] - d.t_us[a]).astype(np.uint32) if d.jitter else None
-                batch = SampleBatch(d.info.stream, 0, int(d.t_us[a]), at, d.samples[a:b], offsets)
-                sent.append((at, d.info.stream, batch))
+                batch = SampleBatch(d.info.stream, 0, int(d.t_us[a]), position, d.samples[a:b], offsets)
+                sent.append((position, d.info.stream, batch))
     sent.sort(key=lambda x: x[:2])
     hello = Hello(take, "replay", tuple(d.info for d in devices))
     return LiveTake(hello, tuple(replace(b, seq=k) for k, (_, _, b) in enumerate(sent)))
@@ -131,9 +133,9 @@ def small_batch(seq: int = 0, n: int = 5, offsets: bool = False) -> SampleBatch:
     """Noise of two sensors without magnetometer."""
     samples = np.random.default_rng(1 + seq).normal(size=(n, 2, 9)).astype(np.float32)
     samples[:, :, 6:] = np.nan
-    at = 1_000_000 + seq * n * 10_000
+    position = 1_000_000 + seq * n * 10_000
     steps = np.arange(n, dtype=np.uint32) * np.uint32(10_000) if offsets else None
-    return SampleBatch(3, seq, at, at + 70_000, samples, steps)
+    return SampleBatch(3, seq, position, position + 70_000, samples, steps)
 
 
 def small(n: int = 3) -> LiveTake:

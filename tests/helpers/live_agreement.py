@@ -1,4 +1,4 @@
-"""Takes given to the live comparison of sensors as blocks of the axis, without the chain beside it."""
+"""Trials passed to the live sensor comparison in blocks, without the rest of the chain."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from sagittal.core.timeline.live import UniformBlock
 
 def cut_blocks(recording: UniformRecording, sizes: Sequence[int] = (50,)) -> Iterator[UniformBlock]:
     """The take in blocks of these sizes in turn."""
-    worn = list(recording.sensors.values())
+    segments = list(recording.sensors.values())
     acc, gyr, valid = (
-        np.stack(x, axis=1) for x in zip(*((s.acc, s.gyr, s.valid) for s in worn), strict=True)
+        np.stack(x, axis=1) for x in zip(*((s.acc, s.gyr, s.valid) for s in segments), strict=True)
     )
     first = count = 0
     while first < len(acc):
@@ -29,32 +29,32 @@ def cut_blocks(recording: UniformRecording, sizes: Sequence[int] = (50,)) -> Ite
 
 
 def find_standings(recording: UniformRecording) -> tuple[int, ...]:
-    """Samples up to which all stood, as live calibration finds them until it is done."""
+    """Samples up to which all sensors were still, as live calibration detects them."""
     calibrator = LiveCalibrator(
         WornSensors(
             tuple(recording.sensors), recording.rate_hz, recording.subject, recording.protocol,
             recording.mounting,
         )
     )  # fmt: skip
-    found: list[int] = []
+    result: list[int] = []
     for block in cut_blocks(recording):
         done = calibrator.push(block)
-        found += calibrator.drain_standings()
+        result += calibrator.drain_standings()
         if done is not None:
             break
-    return tuple(found)
+    return tuple(result)
 
 
 def listen(
     recording: UniformRecording, stood: Sequence[int], sizes: Sequence[int] = (50,)
 ) -> tuple[LiveAgreement, list[tuple[float, Notice]]]:
-    """What is told, and when: seconds of the take."""
-    watch, told = LiveAgreement(tuple(recording.sensors), recording.rate_hz), []
+    """Notices with their times in s of the trial."""
+    watch, notices = LiveAgreement(tuple(recording.sensors), recording.rate_hz), []
     for block in cut_blocks(recording, sizes):
         past = block.first + len(block)
         watch.push(block, tuple(x for x in stood if block.first < x <= past))
-        told += [(past / recording.rate_hz, notice) for notice in watch.compare()]
-    return watch, told
+        notices += [(past / recording.rate_hz, notice) for notice in watch.compare()]
+    return watch, notices
 
 
 def walk_again(recording: UniformRecording, times: int) -> UniformRecording:

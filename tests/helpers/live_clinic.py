@@ -46,7 +46,7 @@ class Visit:
 
     @contextlib.asynccontextmanager
     async def tablet(self, hello: str | None = None) -> AsyncIterator[ClientConnection]:
-        """A socket that has said hello."""
+        """Socket after its hello."""
         async with websockets.connect(self.socket, subprotocols=[PROTOCOL], compression=None) as ws:  # type: ignore[list-item]
             await ws.send(hello or self.hello())
             yield ws
@@ -69,7 +69,7 @@ class Visit:
 
 
 def new_session(clinic: Clinic, **values: Any) -> str:
-    """A session of a patient of its own."""
+    """Session of a new patient."""
     with clinic.db.write() as c:
         patient = patients.create(c, None, code=f"L-{new_id()[:8]}", height_m=1.75)
         return sessions.create(c, None, patient.id, title="Live training", **values).id
@@ -94,7 +94,7 @@ async def visit(clinic: Clinic, port: int, session: str | None = None) -> AsyncI
 
 
 async def heard(ws: ClientConnection, kind: str, **wanted: Any) -> dict[str, Any]:
-    """The next message of a kind with these members; what comes before is passed over."""
+    """Next message of a type with these members; earlier ones are skipped."""
     async with asyncio.timeout(PATIENCE_S):
         while True:
             message = json.loads(await ws.recv())
@@ -103,7 +103,7 @@ async def heard(ws: ClientConnection, kind: str, **wanted: Any) -> dict[str, Any
 
 
 async def closed(ws: ClientConnection) -> tuple[int, str]:
-    """How the server closes; what it says before is passed over."""
+    """Close code and reason; earlier messages are skipped."""
     async with asyncio.timeout(PATIENCE_S):
         with contextlib.suppress(websockets.exceptions.ConnectionClosedError):
             async for _ in ws:

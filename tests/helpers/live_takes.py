@@ -57,15 +57,15 @@ def finish_text(frames: list[bytes]) -> str:
 
 
 def stored(path: Path) -> list[bytes]:
-    """The batches of a log, as they came."""
+    """Batches of a log as received."""
     return [one.body for _, one in segments.read_records(path) if one.kind == "B"]
 
 
 def kept_in(log: bytes) -> list[bytes]:
     """The batches of a whole log in memory."""
-    found, used = scan(log)
+    result, used = scan(log)
     assert used == len(log)
-    return [one.body for one in found if one.kind == "B"]
+    return [one.body for one in result if one.kind == "B"]
 
 
 class Heard:
@@ -80,8 +80,8 @@ class Heard:
     def note_growth(self, size: int) -> None:
         self.sizes.append(size)
 
-    def note_acknowledged(self, below: int) -> None:
-        self.acks.append(below)
+    def note_acknowledged(self, limit: int) -> None:
+        self.acks.append(limit)
 
     def note_end(self, end: TakeEnd) -> None:
         self.ends.append(end)

@@ -39,20 +39,20 @@ def replayed(
     training: dict[str, object] | None = None,
     commands: Sequence[Command] = (),
 ) -> list[Report]:
-    """Everything an estimator says of a whole log."""
+    """All output of an estimator for a whole log."""
     training = training or {}
-    said: list[Report] = []
+    message: list[Report] = []
     begin = FollowTake(
         new_id(), str(log), log.stat().st_size, height_m, "walk",
         training.get("prescription"), training.get("baseline"), list(commands),  # type: ignore[arg-type]
     )  # fmt: skip
-    follower = Follower(begin, said.append)
+    follower = Follower(begin, message.append)
     while follower.has_work:
         follower.step()
     follower.show()
     follower.close()
-    return said
+    return message
 
 
-def items(said: Sequence[Report], kind: str) -> list[FeedItem]:
-    return [one for one in said if isinstance(one, FeedItem) and one.kind == kind]
+def items(message: Sequence[Report], kind: str) -> list[FeedItem]:
+    return [one for one in message if isinstance(one, FeedItem) and one.kind == kind]

@@ -1,4 +1,4 @@
-"""Recordings as a tablet would have sent them, and what the live chain says to them."""
+"""Recordings as a tablet would send them, and the output of the live chain."""
 
 from __future__ import annotations
 
@@ -57,15 +57,15 @@ def live(
 
 def trails(frames: Sequence[LiveFrame]) -> tuple[Floats, dict[str, Floats]]:
     """Times and angles of all frames in a row."""
-    told = [f.trail for f in frames if f.trail.names]
-    t = np.concatenate([x.t_s for x in told])
-    values = np.concatenate([x.values for x in told])
-    return t, {name: values[:, i] for i, name in enumerate(told[0].names)}
+    notices = [f.trail for f in frames if f.trail.names]
+    t = np.concatenate([x.t_s for x in notices])
+    values = np.concatenate([x.values for x in notices])
+    return t, {name: values[:, i] for i, name in enumerate(notices[0].names)}
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A live take, and all samples of its chain as they were remembered: name → (n, …) from `first` on."""
+    """Live trial with all samples of its chain: name → (n, …) from `first` on."""
 
     online: OnlineSession
     frames: list[LiveFrame]
@@ -79,22 +79,22 @@ class Run:
 
     @property
     def events(self) -> list[GaitEvent]:
-        """As they were told last, in order of time."""
-        found: dict[tuple[Side, str, float], GaitEvent] = {}
+        """Last reported version of each event, by time."""
+        result: dict[tuple[Side, str, float], GaitEvent] = {}
         for e in (e for f in self.frames for e in f.events):
-            found[e.side, e.kind, e.time_s if e.first_s is None else e.first_s] = e
-        return sorted(found.values(), key=lambda e: (e.time_s, e.side, e.kind))
+            result[e.side, e.kind, e.time_s if e.first_s is None else e.first_s] = e
+        return sorted(result.values(), key=lambda e: (e.time_s, e.side, e.kind))
 
     @property
     def strides(self) -> list[LiveStride]:
-        """As told, most of them three times."""
+        """Strides as reported, most of them three times."""
         return [s for f in self.frames for s in f.strides]
 
     @property
     def angles_deg(self) -> dict[str, Floats]:
         """Angles over standing by name, (axis,) degrees, 0 before the chain begins."""
-        before = np.zeros((self.chain.first, len(self.chain.names)))
-        whole = np.degrees(np.concatenate((before, self.rows["angles"])))
+        initial_buffer = np.zeros((self.chain.first, len(self.chain.names)))
+        whole = np.degrees(np.concatenate((initial_buffer, self.rows["angles"])))
         return {name: whole[:, i] for i, name in enumerate(self.chain.names)}
 
     def ankle(self, side: Side) -> Floats:

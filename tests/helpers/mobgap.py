@@ -1,8 +1,7 @@
-"""mobgap_lowback for tests: takes of one lower-back sensor and the walking that INDIP found in them.
+"""mobgap_lowback for tests: trials of one lower-back sensor with the walking that INDIP detected.
 
-INDIP (pressure insoles and foot sensors) is the reference of the initial contacts; its walking periods leave
-out what it does not call walking, so steps outside of them are no errors (the stereophotogrammetry has one
-more walk in Test11).
+INDIP (pressure insoles and foot sensors) is the reference for initial contacts; steps outside its walking
+periods are not errors (the stereophotogrammetry has one more walk in Test11).
 """
 
 from __future__ import annotations
@@ -82,28 +81,28 @@ def uniform(trial: tuple[str, str]) -> UniformRecording:
 @cache
 def periods(trial: tuple[str, str]) -> tuple[Period, ...]:
     """Walking periods of INDIP; a contact written down twice within 0.1 s counts once."""
-    found = []
+    result = []
     reference = _signals(trial).Standards.INDIP.ContinuousWalkingPeriod  # type: ignore[attr-defined]
     for w in np.atleast_1d(reference):
         times = np.asarray(w.InitialContact_Event, np.float64)
         whole = np.isfinite(times) & np.concatenate(([True], np.diff(times) > 0.1))
         feet = tuple(str(s).lower() for s in np.asarray(w.InitialContact_LeftRight)[whole])
-        found.append(Period(float(w.Start), float(w.End), times[whole], feet, float(w.Cadence)))
-    return tuple(found)
+        result.append(Period(float(w.Start), float(w.End), times[whole], feet, float(w.Cadence)))
+    return tuple(result)
 
 
 @cache
 def turns_of(trial: tuple[str, str]) -> tuple[tuple[tuple[float, float], ...], tuple[SeenTurn, ...]]:
     """Walks of the stereophotogrammetry, s, and the turns it saw in them."""
-    walks, found = [], []
+    walks, result = [], []
     reference = _signals(trial).Standards.Stereophoto.ContinuousWalkingPeriod  # type: ignore[attr-defined]
     for w in np.atleast_1d(reference):
         walks.append((float(w.Start), float(w.End)))
         rows = (np.atleast_1d(getattr(w, f"Turn_{name}")).astype(float) for name in ("Start", "End", "Angle"))
         for start, end, angle in zip(*rows, strict=True):
             whole = start > w.Start + 0.1 and end < w.End - 0.1
-            found.append(SeenTurn(float(start), float(end), float(angle), bool(whole)))
-    return tuple(walks), tuple(found)
+            result.append(SeenTurn(float(start), float(end), float(angle), bool(whole)))
+    return tuple(walks), tuple(result)
 
 
 def turns(trial: tuple[str, str]) -> tuple[tuple[float, float], ...]:

@@ -1,6 +1,6 @@
-"""neura_walk for tests: the product's chain on it, and what Vicon says of strides and of where sensors face.
+"""neura_walk for tests: the product's chain, and Vicon's strides and sensor headings.
 
-Nothing from Vicon enters an estimate. The person's height is assumed; so is every sensor's place.
+No Vicon data enter an estimate. Body height and sensor positions are assumed.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ MARKERS: dict[Segment, tuple[str, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the product does with seven sensors: forward axes turned until they agree, ErKF and smoother."""
+    """The product's seven-sensor chain: refined anterior axes, ErKF and smoother."""
 
     run: ErkfRun
     calibrated: CalibratedRecording
@@ -135,13 +135,13 @@ def true_strides(side: Side) -> tuple[tuple[int, int, float], ...]:
     along = ankle - heel
     heading = np.unwrap(np.arctan2(along[:, 1], along[:, 0]))
     edges = np.diff(np.concatenate(([0], flags.astype(int), [0])))
-    found = []
+    result = []
     for (a, b), (c, d) in pairwise(zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True)):
         first, last = int(a + b) // 2, int(c + d) // 2
         length = float(np.linalg.norm(ankle[last] - ankle[first]))
         if length > 0.3 and abs(heading[last] - heading[first]) < TURNING:
-            found.append((first, last, length))
-    return tuple(found)
+            result.append((first, last, length))
+    return tuple(result)
 
 
 def stride_errors_m(side: Side, ankle: Floats) -> Floats:

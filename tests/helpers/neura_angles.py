@@ -26,7 +26,7 @@ PLANES = (
 
 @dataclass(frozen=True)
 class Score:
-    """Agreement of one angle in degrees: as it is, standing zeroed, offset removed, and correlation."""
+    """Agreement of one angle in degrees: raw, zeroed at standing, offset removed, and correlation."""
 
     raw: float
     zeroed: float
@@ -42,21 +42,21 @@ def reference() -> dict[str, Floats]:
     return {n.removesuffix("_deg"): np.asarray(table[n]) for n in names if n.endswith("_deg")}
 
 
-def scores(found: dict[str, Floats]) -> tuple[int, dict[str, Score]]:
+def scores(result: dict[str, Floats]) -> tuple[int, dict[str, Score]]:
     """The one lag for all joints, and how each angle agrees."""
     truth = reference()
     shared = min(
-        LAGS, key=lambda k: sum(_error(found[n], truth[n], k)[WALK].std() for n in _names(PLANES[0]))
+        LAGS, key=lambda k: sum(_error(result[n], truth[n], k)[WALK].std() for n in _names(PLANES[0]))
     )
     out = {}
     for name in (n for plane in PLANES for n in _names(plane)):
-        e = _error(found[name], truth[name], shared)
+        e = _error(result[name], truth[name], shared)
         walk, standing = e[WALK], e[STANDING].mean()
         out[name] = Score(
             raw=float(np.sqrt(np.mean(walk**2))),
             zeroed=float(np.sqrt(np.mean((walk - standing) ** 2))),
             offset_removed=float(walk.std()),
-            r=float(np.corrcoef(np.roll(found[name], -shared)[WALK], truth[name][WALK])[0, 1]),
+            r=float(np.corrcoef(np.roll(result[name], -shared)[WALK], truth[name][WALK])[0, 1]),
         )
     return shared, out
 

@@ -1,7 +1,7 @@
-"""Real sensors on a walking body beside optical segments: two recordings, two laboratories.
+"""Real sensors on a walking body with optical segments: two recordings, two laboratories.
 
-How a sensor sits on its segment is not known, and neither is the heading: both are free, one constant turn
-per take. So these are errors of inclination less whatever constant misfit there is.
+Alignment and heading are free, one constant rotation per trial, so these are inclination errors without a
+constant offset.
 """
 
 from __future__ import annotations
@@ -42,9 +42,11 @@ class SegmentTrial:
     up: Floats
 
 
-def inclination_rms(q: Floats, of: SegmentTrial) -> float:
+def inclination_rms(q: Floats, source: SegmentTrial) -> float:
     """RMS angle in rad between the verticals of sensor and segment, after the turn and lag that fit best."""
-    return min(_fit(rotate(conjugate(q), UP), np.roll(of.up, lag, axis=0), of.trial.moving) for lag in LAGS)
+    return min(
+        _fit(rotate(conjugate(q), UP), np.roll(source.up, lag, axis=0), source.trial.moving) for lag in LAGS
+    )
 
 
 def _fit(ours: Floats, theirs: Floats, moving: Bools) -> float:
@@ -66,14 +68,14 @@ def neura_segments() -> tuple[SegmentTrial, ...]:
     table = np.array([[float(x) for x in line.split(",")] for line in lines[1:]])
     part = slice(NEURA_REST.start, NEURA_ROWS.stop)
     rows = np.arange(part.start, part.stop)
-    found = []
+    result = []
     for segment, name in NEURA_NAMES.items():
         x = take.sensors[segment]
-        at = names.index(f"{name}_1")
+        index = names.index(f"{name}_1")
         up = np.full((len(rows), 3), np.nan)
-        up[rows >= NEURA_ROWS.start] = rotate(conjugate(table[:, at : at + 4]), UP)
-        found.append(_trial(segment, take.rate_hz, x.gyr[part], x.acc[part], rows >= NEURA_REST.stop, up))
-    return tuple(found)
+        up[rows >= NEURA_ROWS.start] = rotate(conjugate(table[:, index : index + 4]), UP)
+        result.append(_trial(segment, take.rate_hz, x.gyr[part], x.acc[part], rows >= NEURA_REST.stop, up))
+    return tuple(result)
 
 
 @cache
@@ -85,7 +87,7 @@ def gaitmap_feet() -> tuple[SegmentTrial, ...]:
     x = signals("imu_sample.csv")
     t = np.arange(len(x)) / RATE
     names, mocap = table("mocap_sample.csv")
-    found = []
+    result = []
     for i, side in enumerate(SIDES):
         toe, heel, outer = (
             np.stack([_at(t, mocap[:, names.index(f"{side[0].upper()}_{m}/{a}")]) for a in "xyz"], axis=1)
@@ -93,8 +95,8 @@ def gaitmap_feet() -> tuple[SegmentTrial, ...]:
         )
         acc, gyr = x[::-1, 6 * i : 6 * i + 3], -np.radians(x[::-1, 6 * i + 3 : 6 * i + 6])
         up, moving = _up_in_foot(toe, heel, outer)[::-1], t[::-1] < STILL_S
-        found.append(_trial(FOOT[side], RATE, gyr, acc, moving, up))
-    return tuple(found)
+        result.append(_trial(FOOT[side], RATE, gyr, acc, moving, up))
+    return tuple(result)
 
 
 def _at(t: Floats, values: Floats) -> Floats:
@@ -116,6 +118,6 @@ def _up_in_foot(toe: Floats, heel: Floats, side: Floats) -> Floats:
         return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))
 
     ahead = unit(toe - heel)
-    above = unit(np.cross(ahead, side - heel))
-    across = np.cross(above, ahead)
-    return np.stack([ahead[:, 2], across[:, 2], above[:, 2]], axis=1)
+    upper = unit(np.cross(ahead, side - heel))
+    lateral = np.cross(upper, ahead)
+    return np.stack([ahead[:, 2], lateral[:, 2], upper[:, 2]], axis=1)

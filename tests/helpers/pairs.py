@@ -1,4 +1,4 @@
-"""Times in pairs: what is measured and its yardstick take turns, so that both meet the same machine."""
+"""Paired timing: subject and yardstick alternate so that both meet the same machine load."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def in_pairs(ours: Work, yardstick: Work, times: int = 7) -> tuple[float, float,
 
 def plain_python() -> int:
     """A fixed piece of interpreted work, some 40 ms on a quiet core: what this machine can do right now."""
-    found: dict[int, tuple[float, float]] = {}
+    result: dict[int, tuple[float, float]] = {}
     for i in range(100_000):
         x = 0.5 * i
-        found[i % 1000] = (x, x * x - found.get((i + 1) % 1000, (0.0, 0.0))[0])
-    return len(found)
+        result[i % 1000] = (x, x * x - result.get((i + 1) % 1000, (0.0, 0.0))[0])
+    return len(result)

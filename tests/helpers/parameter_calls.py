@@ -41,7 +41,7 @@ T: Final[Floats] = np.arange(1500) / RATE
 
 
 def refine_contacts(config: PipelineConfig) -> object:
-    """Feet that hardly pitch, land on their toes, raise their heel slowly, or do not stand level."""
+    """Feet that hardly pitch, land on the toes, raise the heel slowly, or are not level."""
     t = T[:500]
     feet = [
         moved(t, 2.0, 0.6, 0.3, radians(60.0), 0.8),
@@ -66,15 +66,15 @@ def refine_contacts(config: PipelineConfig) -> object:
         flat = np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
         turning = np.where((t > 0.9) & (t < 4.5), 0.8, 0.0)
         feet.append((orientation(slow), turning + np.abs(np.gradient(slow, t)), flat))
-    told = []
+    notices = []
     for q, speed, acc in feet:
         state = FootContactState.start(RATE, config.events, config.contacts)
-        told.append(advance_foot_contacts(state, q, np.ones(len(q), np.bool_), speed, acc))
+        notices.append(advance_foot_contacts(state, q, np.ones(len(q), np.bool_), speed, acc))
     tilted: dict[Segment, Floats] = {
         "foot_l": foot_pitch(T, 2.0, 8, 1.1) - 0.3,
         "foot_r": foot_pitch(T, 2.0, 8, 1.1, 0.5) - 0.1,
     }
-    return told, detect_contacts(orientations(RATE, tilted), config.events, config.contacts)
+    return notices, detect_contacts(orientations(RATE, tilted), config.events, config.contacts)
 
 
 def detect_swings(config: PipelineConfig) -> object:
@@ -84,7 +84,7 @@ def detect_swings(config: PipelineConfig) -> object:
     knots = [0.0, 0.05, 0.15, 0.25, 0.35, 0.42, 0.5, 0.65, 0.7, 0.75, 1.0]
     values = [0.0, 0.0, -4.0, -0.2, -1.5, 0.0, 5.0, 0.0, -2.0, 0.0, 0.0]
     twice = np.interp(T % 1.0, knots, values) * ((T > 2.0) & (T < 12.0))
-    found = []
+    results = []
     for rate in (
         swinging(T),
         shaken,
@@ -93,27 +93,27 @@ def detect_swings(config: PipelineConfig) -> object:
         swinging(T) * (0.25 + 0.05 * T),
         swinging(0.7 * T),
     ):
-        made = shanks(np.asarray(rate))
-        q, valid = made.q["shank_l"], made.valid["shank_l"]
+        result = shanks(np.asarray(rate))
+        q, valid = result.q["shank_l"], result.valid["shank_l"]
         limbs: tuple[Segment, ...] = ("shank_l", "shank_r", "foot_l", "foot_r")
-        both = replace(made, q=dict.fromkeys(limbs, q), valid=dict.fromkeys(limbs, valid))
+        joint_variant = replace(result, q=dict.fromkeys(limbs, q), valid=dict.fromkeys(limbs, valid))
         for preset in config.consensus.gyro_peaks.by_name.values():
-            found += [gyro_peak_events(both, RATE, preset)]
-    return found
+            results += [gyro_peak_events(joint_variant, RATE, preset)]
+    return results
 
 
 def follow_a_day_s_turns(config: PipelineConfig) -> object:
     """Turns of a trunk: quick and slow, cut in two, too small."""
     rate = np.zeros(len(T))
-    for at, lasts, angle in (
+    for position, lasts, angle in (
         (1.0, 1.0, 50.0),
         (3.0, 2.0, 120.0),
         (6.0, 0.4, 60.0),
         (6.5, 0.4, 60.0),
         (8.0, 5.0, 170.0),
     ):
-        inside = (at <= T) & (at + lasts > T)
-        rate[inside] += radians(angle) / lasts * 2.0 * np.sin(np.pi * (T[inside] - at) / lasts) ** 2
+        inside = (position <= T) & (position + lasts > T)
+        rate[inside] += radians(angle) / lasts * 2.0 * np.sin(np.pi * (T[inside] - position) / lasts) ** 2
     return find_turns(rate, np.ones(len(T), np.bool_), RATE, config.activity.turns)
 
 
@@ -141,7 +141,7 @@ def hear_slips(config: PipelineConfig) -> object:
 
 
 def hear_standings(config: PipelineConfig) -> object:
-    """A shank that stands otherwise after the walk than before, and a thigh that does a little."""
+    """A shank with a different posture after the walk, and a slightly changed thigh."""
     ahead = np.array([1.0, 0.0, 0.0])
     turns = {
         "shank_l": StandingTurn(0.3, 0.3, ahead), "thigh_l": StandingTurn(0.1, 0.1, ahead),
@@ -159,7 +159,7 @@ def lose_samples(config: PipelineConfig) -> object:
 
 
 def lie_on_a_table(config: PipelineConfig) -> object:
-    """Sensors that somebody touches as the take begins, on a table that is not level."""
+    """Sensors on a tilted table, touched at the start of the trial."""
     params, take = config.squat.table_top, carried()
     until = round(0.9 * take.rate_hz)
     shaken = {}
@@ -189,17 +189,17 @@ def sway_while_standing(config: PipelineConfig) -> object:
 
 
 def walk_in_pieces(segment: Segment, seed: int) -> UniformRecording:
-    """A trunk that walks some steps, pauses, and goes on at another pace."""
+    """A trunk that takes some steps, pauses, and continues at another pace."""
     rng, rate = np.random.default_rng(seed), 50.0
-    phase, moving, at = [], [], 0.0
+    phase, moving, position = [], [], 0.0
     for _ in range(8):
         step_s, steps = rng.uniform(0.45, 0.8), int(rng.choice((2, 3, 5, 7, 12, 25)))
         own = np.arange(round(steps * step_s * rate)) / (step_s * rate)
         own = own + rng.uniform(0.0, 0.12) * np.sin(rng.uniform(1.0, 3.0) * own)
         still = np.zeros(round(rng.choice((0.4, 0.9, 1.4, 2.5, 4.0)) * rate))
-        phase += [at + own, at + steps + still]
+        phase += [position + own, position + steps + still]
         moving += [np.ones(len(own)), still]
-        at += steps
+        position += steps
     return make_trunk(segment, np.concatenate(phase), np.concatenate(moving), rng, rate)
 
 
@@ -208,10 +208,11 @@ def make_trunk(
 ) -> UniformRecording:
     """A trunk that has made `turned` (n,) steps; on (n,) 1 while it walks."""
     n, noise = len(on), rng.normal(0.0, 0.15, (6, len(on)))
-    across = 0.6 * on * np.sin(np.pi * turned)
-    acc = np.stack((across, 0.3 * across, GRAVITY + 2.0 * on * np.cos(2.0 * np.pi * turned)), axis=1)
+    lateral = 0.6 * on * np.sin(np.pi * turned)
+    acc = np.stack((lateral, 0.3 * lateral, GRAVITY + 2.0 * on * np.cos(2.0 * np.pi * turned)), axis=1)
     gyr = (
-        np.stack((0.2 * across, 0.0 * across, 0.5 * on * np.cos(np.pi * turned)), axis=1) + 0.2 * noise[:3].T
+        np.stack((0.2 * lateral, 0.0 * lateral, 0.5 * on * np.cos(np.pi * turned)), axis=1)
+        + 0.2 * noise[:3].T
     )
     if segment == "chest":
         gyr = np.zeros((n, 3))
@@ -237,27 +238,27 @@ def step_in_a_day(config: PipelineConfig) -> object:
 
 
 def question_slips(config: PipelineConfig) -> object:
-    """Turns that nobody witnessed, and one that the strides deny."""
-    params, across = config.agreement.slips, np.array([0.0, 1.0, 0.0])
+    """Rotations without confirmation by strides, and one contradicted by them."""
+    params, values = config.agreement.slips, np.array([0.0, 1.0, 0.0])
     swing = np.stack((0.0 * T, 3.0 * np.sin(2.0 * np.pi * T), 0.0 * T), axis=1)
     q = exp(np.stack((0.0 * T, (3.0 - 3.0 * np.cos(2.0 * np.pi * T)) / (2.0 * np.pi), 0.0 * T), axis=1))
     motion = LevelMotion(q, np.tile([[0.0], [0.0], [GRAVITY]], len(T)), swing)
     valid = np.ones(len(T), np.bool_)
     small, large = PlaceStep(7.0, radians(9.5), 5.0, 0.03), PlaceStep(7.0, radians(15.0), 20.0, 0.01)
-    asked: tuple[tuple[PlaceStep, dict[Segment, LevelMotion]], ...] = (
+    requests: tuple[tuple[PlaceStep, dict[Segment, LevelMotion]], ...] = (
         (small, {}),
         (large, {"shank_l": motion}),
     )
     return [
-        question_strides("shank_l", step, across, motions, valid, RATE, 3.0, params)
-        for step, motions in asked
+        question_strides("shank_l", step, values, motions, valid, RATE, 3.0, params)
+        for step, motions in requests
     ]
 
 
 def watch_sensors(config: PipelineConfig) -> object:
-    """A sensor that only turns, one of its axes stuck, and one that repeats a sample nearly of rest.
+    """A rotating sensor, one with a stuck axis, and one that repeats a sample close to rest.
 
-    The second also goes on from a repeated rest as if it had been turning, and repeats a moving sample.
+    The second also leaves a repeated rest as if rotating, and repeats a moving sample.
     """
     noise = np.random.default_rng(4).normal(0.0, 0.02, (4, len(T), 3))
     valid = np.ones(len(T), np.bool_)
@@ -270,12 +271,12 @@ def watch_sensors(config: PipelineConfig) -> object:
     acc = np.array([0.0, 0.0, GRAVITY]) + noise[2:]
     acc[1, 600:690] = (0.0, 0.0, GRAVITY + 1.0)
     acc[1, 500:504] = acc[1, 550:553] = (0.0, 0.0, GRAVITY)
-    worn: dict[Segment, SensorSignals] = {
+    segments: dict[Segment, SensorSignals] = {
         "shank_l": SensorSignals("A", acc[0], turning, None, valid, ~valid),
         "shank_r": SensorSignals("B", acc[1], frozen, None, valid, ~valid),
     }
-    found = mark_stuck(UniformRecording(T, RATE, worn, Subject(), "walk", {}), config.stuck)
-    return found.notices, {s: x.valid for s, x in found.sensors.items()}
+    stuck = mark_stuck(UniformRecording(T, RATE, segments, Subject(), "walk", {}), config.stuck)
+    return stuck.notices, {s: x.valid for s, x in stuck.sensors.items()}
 
 
 def compare_axes(config: PipelineConfig) -> object:
@@ -294,15 +295,15 @@ def move_without_legs(config: PipelineConfig) -> object:
 
 
 def pause_between_swings(config: PipelineConfig) -> object:
-    """One leg swings, pauses, and swings again while the other stands."""
+    """One leg swings, pauses and swings again while the other is still."""
     swings = np.where(((T > 2.0) & (T < 6.5)) | ((T > 9.0) & (T < 13.0)), 1.5, 0.0) * np.sin(5.0 * T)
     valid, still = np.ones(len(T), np.bool_), np.zeros((len(T), 3))
     rates = np.stack((0.0 * T, swings, 0.0 * T), axis=1)
-    worn: dict[Segment, SensorSignals] = {
+    segments: dict[Segment, SensorSignals] = {
         "thigh_l": SensorSignals("A", still + GRAVITY, rates, None, valid, ~valid),
         "thigh_r": SensorSignals("B", still + GRAVITY, still, None, valid, ~valid),
     }
-    take = UniformRecording(T, RATE, worn, Subject(), "walk", {})
+    take = UniformRecording(T, RATE, segments, Subject(), "walk", {})
     return find_functional_movements(take, config.calibration.functional)
 
 

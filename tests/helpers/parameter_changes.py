@@ -1,4 +1,4 @@
-"""Every single parameter of the pipeline, other values for it, and what a stage makes of them."""
+"""Single pipeline parameters, alternative values, and their effect on a stage."""
 
 from __future__ import annotations
 
@@ -72,14 +72,14 @@ def replace_value(config: Any, path: Path, new: object) -> Any:
     """
     if not path:
         return new
-    first, rest = path[0], path[1:]
+    first, remainder = path[0], path[1:]
     if isinstance(config, Mapping):
         key = first[1:-1]
-        return type(config)({**config, key: replace_value(config[key], rest, new)})  # type: ignore[call-arg]
+        return type(config)({**config, key: replace_value(config[key], remainder, new)})  # type: ignore[call-arg]
     if isinstance(config, tuple):
-        at = int(first[1:-1])
-        return (*config[:at], replace_value(config[at], rest, new), *config[at + 1 :])
-    return dataclasses.replace(config, **{first: replace_value(getattr(config, first), rest, new)})
+        index = int(first[1:-1])
+        return (*config[:index], replace_value(config[index], remainder, new), *config[index + 1 :])
+    return dataclasses.replace(config, **{first: replace_value(getattr(config, first), remainder, new)})
 
 
 def list_changes(parameter: Parameter) -> list[object]:
@@ -123,45 +123,45 @@ def _propose(default: object, hint: object) -> list[object]:
 
 def digest(*results: object) -> str:
     """Hash of results, arrays to the bit; parameters that a result keeps for later are no part of it."""
-    seen = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for result in results:
-        _feed(seen, result)
-    return seen.hexdigest()[:16]
+        _feed(sha256, result)
+    return sha256.hexdigest()[:16]
 
 
-def _feed(seen: Any, value: object) -> None:
+def _feed(observations: Any, value: object) -> None:
     if isinstance(value, np.ndarray | np.generic):
         array = np.ascontiguousarray(value)
-        seen.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
+        observations.update(f"{array.dtype}{array.shape}".encode() + array.tobytes())
     elif dataclasses.is_dataclass(value) and not isinstance(value, type):
         if type(value).__name__.endswith("Params"):
             return
         for f in dataclasses.fields(value):
-            seen.update(f.name.encode())
-            _feed(seen, getattr(value, f.name))
+            observations.update(f.name.encode())
+            _feed(observations, getattr(value, f.name))
     elif isinstance(value, Mapping):
         for key, item in value.items():
-            _feed(seen, key)
-            _feed(seen, item)
+            _feed(observations, key)
+            _feed(observations, item)
     elif isinstance(value, list | tuple):
-        seen.update(f"[{len(value)}".encode())
+        observations.update(f"[{len(value)}".encode())
         for item in value:
-            _feed(seen, item)
+            _feed(observations, item)
     elif isinstance(value, set | frozenset):
-        _feed(seen, sorted(map(repr, value)))
+        _feed(observations, sorted(map(repr, value)))
     elif value is None or isinstance(value, str | bytes | int | float | bool | Enum):
-        seen.update(repr(value).encode() + b";")
+        observations.update(repr(value).encode() + b";")
     elif hasattr(value, "__dict__") or hasattr(type(value), "__slots__"):
         held = getattr(value, "__dict__", None) or {
             n: getattr(value, n) for n in getattr(type(value), "__slots__", ())
         }
-        _feed(seen, dict(sorted(held.items())))
+        _feed(observations, dict(sorted(held.items())))
     else:
         raise TypeError(f"cannot hash a {type(value).__name__}")
 
 
 class StagedTake:
-    """A take as it is before each of its stages, run only as far as is asked for."""
+    """Trial before each of its stages, computed on demand."""
 
     def __init__(self, recording: Recording, config: PipelineConfig) -> None:
         self.config = config
@@ -179,8 +179,8 @@ class StagedTake:
         """Digest of what one stage gives with other parameters for it alone."""
         if stage not in self._before:
             self._run_before(stage)
-        before, run = self._before[stage]
-        return _run_one(dataclasses.replace(before, config=config), run)[1]
+        initial, run = self._before[stage]
+        return _run_one(dataclasses.replace(initial, config=config), run)[1]
 
     def observe_usual(self, stage: str) -> str:
         """The same with the parameters of the take."""
@@ -222,7 +222,7 @@ class DirectCall:
         return [self.STAGE]
 
     def observe(self, stage: str, config: PipelineConfig) -> str:
-        """Digest of what the function gives."""
+        """Digest of the function's result."""
         assert stage == self.STAGE
         try:
             return digest(self._call(config))
@@ -234,10 +234,16 @@ class DirectCall:
         return self.observe(stage, self.config)
 
 
-def _run_one(before: TakeAnalysis, stage: PipelineStage) -> tuple[TakeAnalysis | None, str]:
+def _run_one(earlier: TakeAnalysis, stage: PipelineStage) -> tuple[TakeAnalysis | None, str]:
     try:
-        after = run_stages(before, (stage,), say_nothing)
+        final_stages = run_stages(earlier, (stage,), say_nothing)
     except SagittalError as error:
         return None, digest(error.code, error.message, error.sensor, error.t_s)
-    given = [getattr(after, name) for name in stage.results]
-    return after, digest(*given, after.setup, after.calibration_score, after.problem, after.stopped_at)
+    getattrs = [getattr(final_stages, name) for name in stage.results]
+    return final_stages, digest(
+        *getattrs,
+        final_stages.setup,
+        final_stages.calibration_score,
+        final_stages.problem,
+        final_stages.stopped_at,
+    )

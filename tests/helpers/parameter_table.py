@@ -44,11 +44,11 @@ def read_rows() -> list[Row]:
 def write_rows(rows: Iterable[Row]) -> None:
     """Write the table in the order of the configuration."""
     order = {p.name: i for i, p in enumerate(list_parameters())}
-    kept = sorted((r for r in rows if r.parameter in order), key=lambda r: order[r.parameter])
+    stored_items = sorted((r for r in rows if r.parameter in order), key=lambda r: order[r.parameter])
     with TABLE.open("w", encoding="utf-8", newline="") as f:
         writer = csv.writer(f, lineterminator="\n")
         writer.writerow(COLUMNS)
-        writer.writerows((r.parameter, r.take, r.stage, json.dumps(r.value)) for r in kept)
+        writer.writerows((r.parameter, r.take, r.stage, json.dumps(r.value)) for r in stored_items)
 
 
 def _read_value(text: str) -> object:

@@ -44,26 +44,30 @@ FEET: Final[tuple[Segment, ...]] = ("pelvis", "foot_l", "foot_r")
 
 @dataclass(frozen=True)
 class Take:
-    """How a take is made, and what is chosen for it that is not the default (name → value)."""
+    """Definition of a trial with its non-default options (name → value)."""
 
     make: Callable[[], Recording]
     chosen: dict[str, object] = field(default_factory=dict)
 
 
 def walk(script: Script = WALK, seed: int = 0, **setup: object) -> Recording:
-    """A walk of the reference person, with seven sensors where nothing else is said."""
+    """Walk of the reference person, by default with seven sensors."""
     return simulate(script, Walker(), seed, replace(ON_SKIN, **setup)).recording  # type: ignore[arg-type]
 
 
 def edit(recording: Recording, change: Callable[[UniformRecording], UniformRecording]) -> Recording:
-    """A recording whose sensors are what a change makes of them on the common axis, lost samples left out."""
+    """Recording with modified sensors on the common axis, without lost samples."""
     uniform = change(synchronise(recording))
-    worn = {s: d for d, s in recording.segments.items() if s is not None}
+    segment_names = {s: d for d, s in recording.segments.items() if s is not None}
     streams = dict(recording.streams)
     for segment, x in uniform.sensors.items():
-        kept = x.valid
-        streams[worn[segment]] = streams[worn[segment]].change(
-            t_s=uniform.t_s[kept], acc=x.acc[kept], gyr=x.gyr[kept], mag=None, quat=None
+        stored_valid = x.valid
+        streams[segment_names[segment]] = streams[segment_names[segment]].change(
+            t_s=uniform.t_s[stored_valid],
+            acc=x.acc[stored_valid],
+            gyr=x.gyr[stored_valid],
+            mag=None,
+            quat=None,
         )
     return replace(recording, streams=streams)
 
@@ -104,8 +108,8 @@ def freeze(acc: Floats, gyr: Floats) -> None:
 
 def loop(acc: Floats, gyr: Floats) -> None:
     """The last packet of 20 samples, again and again."""
-    again = 900 + np.arange(len(acc) - 900) % 20
-    acc[900:], gyr[900:] = acc[again], gyr[again]
+    second = 900 + np.arange(len(acc) - 900) % 20
+    acc[900:], gyr[900:] = acc[second], gyr[second]
 
 
 def clip(acc: Floats, gyr: Floats) -> None:
@@ -121,7 +125,7 @@ def clip_force(acc: Floats, gyr: Floats) -> None:
 
 
 def roll(acc: Floats, gyr: Floats) -> None:
-    """A foot that never stands quite still."""
+    """A foot that is never completely still."""
     acc[600:] *= 1.2
 
 
@@ -146,9 +150,9 @@ def shorten(recording: Recording, start_s: float, end_s: float) -> Recording:
     """Every stream from one time to another."""
     streams = {}
     for device, x in recording.streams.items():
-        kept = (x.t_s >= start_s) & (x.t_s < end_s)
-        gyr = x.gyr if x.gyr is None else x.gyr[kept]
-        streams[device] = x.change(t_s=x.t_s[kept], acc=x.acc[kept], gyr=gyr, mag=None, quat=None)
+        retained = (x.t_s >= start_s) & (x.t_s < end_s)
+        gyr = x.gyr if x.gyr is None else x.gyr[retained]
+        streams[device] = x.change(t_s=x.t_s[retained], acc=x.acc[retained], gyr=gyr, mag=None, quat=None)
     return replace(recording, streams=streams)
 
 
@@ -163,9 +167,9 @@ def miss(recording: Recording, start_s: float, end_s: float) -> Recording:
     """Every stream without a part of it."""
     streams = {}
     for device, x in recording.streams.items():
-        kept = (x.t_s < start_s) | (x.t_s >= end_s)
-        gyr = x.gyr if x.gyr is None else x.gyr[kept]
-        streams[device] = x.change(t_s=x.t_s[kept], acc=x.acc[kept], gyr=gyr, mag=None, quat=None)
+        retained = (x.t_s < start_s) | (x.t_s >= end_s)
+        gyr = x.gyr if x.gyr is None else x.gyr[retained]
+        streams[device] = x.change(t_s=x.t_s[retained], acc=x.acc[retained], gyr=gyr, mag=None, quat=None)
     return replace(recording, streams=streams)
 
 
@@ -176,13 +180,13 @@ def declare(recording: Recording) -> Recording:
 
 def detect_by(preset: str, recording: str = "healthy", **other: object) -> Take:
     """Contacts of one published detector alone."""
-    worn = (
+    segments = (
         ("pelvis", "foot_l", "foot_r")
         if preset in ("mariani", "perez_ibarra")
         else ("pelvis", "shank_l", "shank_r")
     )
     return Take(
-        lambda: simulate_scenario(recording, 1, worn=worn).recording,  # type: ignore[arg-type]
+        lambda: simulate_scenario(recording, 1, worn=segments).recording,  # type: ignore[arg-type]
         {"detector": "consensus", "consensus.presets": (preset,)}
         | {f"consensus.gyro_peaks.{preset}.{name}": value for name, value in other.items()},
     )

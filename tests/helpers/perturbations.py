@@ -1,4 +1,4 @@
-"""What a clinic does to a take without meaning to: late clocks, exchanged labels, sensors that slip."""
+"""Typical clinic mistakes: clock offsets, swapped labels, slipped sensors."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def delay_sensor(recording: UniformRecording, segment: Segment, late_s: float | 
 def slip_sensor(
     recording: UniformRecording, segment: Segment, by_rad: float, at_s: float, axis: Floats | None = None
 ) -> UniformRecording:
-    """One sensor turns on its segment within `SLIP_S`, and its gyroscope sees that.
+    """Rotate one sensor on its segment within `SLIP_S`, measured by its gyroscope.
 
     Parameters
     ----------
-    axis : (3,) in the sensor, None = what it turns about most, across the leg.
+    axis : (3,) in sensor axes; None = its main rotation axis, medio-lateral.
     """
     x = recording.sensors[segment]
     about = find_main_axis(x.gyr) if axis is None else axis / np.linalg.norm(axis)

@@ -39,7 +39,7 @@ _numbers = itertools.count()
 
 
 class NoPostgresError(Exception):
-    """There is none here; the message says why."""
+    """PostgreSQL is not installed; the message gives the reason."""
 
 
 @functools.cache
@@ -123,7 +123,7 @@ class PostgresProcess:
                 return
 
     def stop(self) -> None:
-        """End it as an administrator's restart does: what is under way is cut off and undone."""
+        """Stop it like an administrator's restart, aborting open transactions."""
         if self._process is None:
             return
         self._process.send_signal(signal.SIGINT)
@@ -163,15 +163,15 @@ def run_sql(statement: str, url: str | None = None) -> list[Any]:
     import psycopg
 
     with psycopg.connect(url or start_server(), autocommit=True) as connection:
-        found = connection.execute(statement.encode())
-        return found.fetchall() if found.description else []
+        cursor = connection.execute(statement.encode())
+        return cursor.fetchall() if cursor.description else []
 
 
 @contextlib.contextmanager
 def make_database(*, migrated: bool = True) -> Iterator[str]:
-    """A database while the block runs: one without tables of its own, or the migrated one without rows.
+    """Temporary database: empty, or the migrated one without rows.
 
-    To empty that one costs a tenth of making another; who changes its tables takes one of his own.
+    Emptying the migrated one costs a tenth of creating another; tests that change its tables use a new one.
     """
     if migrated:
         url = _migrate_one()
@@ -229,7 +229,7 @@ def _choose_user(folder: Path) -> dict[str, Any]:
         return {}
     for name in USERS:
         with contextlib.suppress(KeyError):
-            who = pwd.getpwnam(name)
-            os.chown(folder, who.pw_uid, who.pw_gid)
-            return {"user": who.pw_uid, "group": who.pw_gid, "extra_groups": []}
+            getpwnam = pwd.getpwnam(name)
+            os.chown(folder, getpwnam.pw_uid, getpwnam.pw_gid)
+            return {"user": getpwnam.pw_uid, "group": getpwnam.pw_gid, "extra_groups": []}
     raise NoPostgresError(f"PostgreSQL does not run as root, and there is no user {' or '.join(USERS)}")

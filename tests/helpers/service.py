@@ -29,11 +29,11 @@ class Service:
 
 
 def line_with(process: subprocess.Popen[str], pattern: str) -> str:
-    """The first printed line that matches; the server says nothing else on stdout."""
+    """First matching line of the server's standard output."""
     assert process.stdout is not None
     for line in process.stdout:
-        if found := re.search(pattern, line):
-            return found.group(0)
+        if match := re.search(pattern, line):
+            return match.group(0)
     pytest.fail(f"the server ended with {process.wait()} before it printed {pattern}")
 
 
@@ -72,8 +72,10 @@ def wait_for(client: httpx.Client, job_id: str) -> dict[str, Any]:
 
 def new_session(client: httpx.Client, code: str) -> str:
     patient = client.post("/api/v1/patients", json={"code": code}).raise_for_status().json()
-    made = client.post(f"/api/v1/patients/{patient['id']}/sessions", json={"title": "Walk", "height_m": 1.7})
-    return str(made.raise_for_status().json()["id"])
+    response = client.post(
+        f"/api/v1/patients/{patient['id']}/sessions", json={"title": "Walk", "height_m": 1.7}
+    )
+    return str(response.raise_for_status().json()["id"])
 
 
 def upload(client: httpx.Client, session: str, name: str, content: bytes) -> None:

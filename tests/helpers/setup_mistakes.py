@@ -1,4 +1,4 @@
-"""Mistakes in the set-up of a right take: who wears what, how sensors sit, their axes, units and signs."""
+"""Set-up mistakes on a correct trial: labels, alignment, axes, units and signs."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ MIRRORS: tuple[Floats, ...] = tuple(m for m in SIGNED if np.linalg.det(m) < 0.0)
 
 
 def change_axes(
-    recording: Recording, worn: Segment, acc: Floats | float = 1.0, gyr: Floats | float = 1.0
+    recording: Recording, segments: Segment, acc: Floats | float = 1.0, gyr: Floats | float = 1.0
 ) -> Recording:
     """One sensor whose accelerometer and gyroscope give their values times a matrix (3, 3) or a number."""
-    device = next(d for d, s in recording.segments.items() if s == worn)
+    device = next(d for d, s in recording.segments.items() if s == segments)
     x = recording.streams[device]
     a, g = (m * np.eye(3) if isinstance(m, float) else m for m in (acc, gyr))
     changed = replace(x, acc=x.acc @ a.T, gyr=None if x.gyr is None else x.gyr @ g.T, mag=None, quat=None)
@@ -41,20 +41,20 @@ def change_axes(
 
 
 def exchange_labels(recording: Recording, names: Mapping[Segment, Segment]) -> Recording:
-    """Sensors that are said to be worn elsewhere: true segment → stated one."""
+    """Sensors with wrong labels: true segment → stated one."""
     stated = {d: None if s is None else names.get(s, s) for d, s in recording.segments.items()}
     return replace(recording, segments=stated)
 
 
 def apply_repair(recording: Recording, repair: SetupRepair) -> Recording:
-    """The recording as it is read with the repaired manifest."""
+    """Recording read with the repaired manifest."""
     streams, _ = correct_streams(recording.streams, repair.corrections)
     segments = {d: repair.segments.get(d, s) for d, s in recording.segments.items()}
     return replace(recording, streams=streams, segments=segments)
 
 
 def look_at(recording: Recording) -> tuple[SetupRepair | None, SensorExchange | None]:
-    """What the stage `agreement` proposes and what it exchanges by itself, without the stages behind."""
+    """Proposal and automatic corrections of the stage `agreement`, without later stages."""
     uniform, params = synchronise(recording), AgreementParams()
     repair = propose_repair(recording, uniform, agreement=params)
     if repair is not None:

@@ -1,4 +1,4 @@
-"""Squats of which the sensors lie on a table first."""
+"""Squats whose sensors start on a table."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def from_table() -> Recording:
     segments: dict[str, Segment | None] = {}
     for i, segment in enumerate(WORN):
         truth = squats.truth
-        worn = multiply(truth.q[segment][0], truth.mounts[segment].q_segment_sensor)
-        way, done = carry(worn, rng, None, 0.5, move_s=6.0), squats.ideal[segment]
+        segment_names = multiply(truth.q[segment][0], truth.mounts[segment].q_segment_sensor)
+        way, done = carry(segment_names, rng, None, 0.5, move_s=6.0), squats.ideal[segment]
         lying = np.zeros((round(3.0 * i * RATE), 3))
         standing = np.zeros((round(3.0 * (2 - i) * RATE), 3))
         bias = np.radians(0.5) * np.array([1.0, -1.0, 1.0])

@@ -189,14 +189,14 @@ _CODE: Final = frozenset(
 
 @cache
 def list_messages() -> dict[str, list[str]]:
-    """Every message of the sources → the files it stands in."""
-    found: dict[str, list[str]] = {}
+    """Messages of the sources with the files that contain them."""
+    result: dict[str, list[str]] = {}
 
     def keep(messages: Iterator[str], path: Path) -> None:
         name = path.relative_to(ROOT).as_posix()
         for message in messages:
             if message and not NOT_WORDS.match(message) and not CITED.search(message):
-                files = found.setdefault(message, [])
+                files = result.setdefault(message, [])
                 if name not in files:
                     files.append(name)
 
@@ -215,16 +215,16 @@ def list_messages() -> dict[str, list[str]]:
                 # its notices are called something above their English sentence
                 keep(titles_of(ast.parse(path.read_text("utf-8"))), path)
     for word in sorted(WORDS):
-        found.setdefault(word, []).append("tests/helpers/texts.py")
+        result.setdefault(word, []).append("tests/helpers/texts.py")
     for phrase in PHRASES:
-        found.setdefault(phrase, ["tests/helpers/texts.py"])
+        result.setdefault(phrase, ["tests/helpers/texts.py"])
     # what a figure is, where a goniometer gave the zero (server/report/view/level.py)
-    for message in [m for m in found if m.endswith(f", {STANDING}.")]:
-        found.setdefault(message.replace(STANDING, ANATOMICAL), found[message])
+    for message in [m for m in result if m.endswith(f", {STANDING}.")]:
+        result.setdefault(message.replace(STANDING, ANATOMICAL), result[message])
     for beginning in UNMEASURED:
-        for message in [m for m in found if m.startswith(beginning)]:
-            found.setdefault(message.removeprefix(beginning), found[message])
-    return found
+        for message in [m for m in result if m.startswith(beginning)]:
+            result.setdefault(message.removeprefix(beginning), result[message])
+    return result
 
 
 def _is_in(name: str, place: str) -> bool:
@@ -237,16 +237,16 @@ _TAGGED: Final = re.compile(
 
 
 def script_texts(source: str) -> Iterator[str]:
-    """Texts of a script: those with the tag `speak`; values are {0}, {1} …"""
-    for found in _TAGGED.finditer(source):
+    """Texts of a script, tagged `speak`; values are {0}, {1} …"""
+    for matche in _TAGGED.finditer(source):
         numbers = itertools.count()
         inner = re.sub(
-            r"\$\{(?:[^{}`]|\{[^{}]*\}|`[^`]*`)*\}", lambda _, n=numbers: f"{{{next(n)}}}", found[1]
+            r"\$\{(?:[^{}`]|\{[^{}]*\}|`[^`]*`)*\}", lambda _, n=numbers: f"{{{next(n)}}}", matche[1]
         )
         yield re.sub(
             r"\\u([0-9a-fA-F]{4})|\\(.)", lambda m: chr(int(m[1], 16)) if m[1] else m[2], inner
         ).strip()
-        for value in re.findall(r"\$\{(?:[^{}`]|\{[^{}]*\}|`[^`]*`)*\}", found[1]):
+        for value in re.findall(r"\$\{(?:[^{}`]|\{[^{}]*\}|`[^`]*`)*\}", matche[1]):
             yield from script_texts(value)
             yield from (text for text in re.findall(r'"([^"]+)"', value) if re.fullmatch(r"[a-z ]{3,}", text))
 
@@ -257,12 +257,12 @@ def python_texts(source: str, *, whole: bool) -> Iterator[str]:
     no_text = set(_no_texts(tree))
     calls = [n for n in ast.walk(tree) if isinstance(n, ast.Call) and SAID.match(_name(n.func))]
     yield from titles_of(tree)
-    made = set() if whole else {id(node) for call in calls for node in ast.walk(call)}
+    result = set() if whole else {id(node) for call in calls for node in ast.walk(call)}
     for node in ast.walk(tree):
         if id(node) not in no_text and _is_text(node):
-            for message in (text for told in messages_of(node) for text in _between_tags(told)):
+            for message in (text for notices in messages_of(node) for text in _between_tags(notices)):
                 # elsewhere a sentence may be made before the call that tells it
-                told_here = whole or id(node) in made or (bool(calls) and SENTENCE.match(message))
+                told_here = whole or id(node) in result or (bool(calls) and SENTENCE.match(message))
                 if told_here and reads_like_text(message) and has_words(message):
                     yield message
 
@@ -277,9 +277,11 @@ def titles_of(tree: ast.AST) -> Iterator[str]:
                 yield title_of_code(code)
 
 
-def _between_tags(told: str) -> list[str]:
-    """The texts of a piece of HTML; what is none, as it is."""
-    return [t.strip() for t in re.findall(r">([^<>]+)(?=<)", told)] if told.startswith("<") else [told]
+def _between_tags(notices: str) -> list[str]:
+    """Texts of an HTML fragment; other content is unchanged."""
+    return (
+        [t.strip() for t in re.findall(r">([^<>]+)(?=<)", notices)] if notices.startswith("<") else [notices]
+    )
 
 
 def _is_text(node: ast.AST) -> bool:
@@ -291,7 +293,7 @@ def _is_text(node: ast.AST) -> bool:
 
 
 def _no_texts(tree: ast.AST) -> Iterator[int]:
-    """Nodes that are no texts: docstrings, keys, what is compared, parts of a text told as a whole."""
+    """Nodes that are not texts: docstrings, keys, compared values, parts of a translated text."""
     for node in ast.walk(tree):
         parts: list[ast.AST] = []
         match node:
@@ -349,10 +351,10 @@ def _parts(node: ast.AST, names: list[str]) -> list[tuple[str, ...]]:
             branches = [[*itertools.product(*parts(branch))] for branch in (one, other)]
             return [tuple(dict.fromkeys("".join(choice) for branch in branches for choice in branch))]
         case ast.Call(args=[ast.Name() | ast.Attribute() as first, *_]):
-            found = re.findall(r"[A-Za-z]\w+", ast.unparse(first))
+            matches = re.findall(r"[A-Za-z]\w+", ast.unparse(first))
         case _:
-            found = re.findall(r"[A-Za-z]\w+", ast.unparse(node).split("(")[0])
-    name = found[-1] if found else "value"
+            matches = re.findall(r"[A-Za-z]\w+", ast.unparse(node).split("(")[0])
+    name = matches[-1] if matches else "value"
     count = names.count(name)
     names.append(name)
     return [(f"{{{name}{count + 1 if count else ''}}}",)]
@@ -371,15 +373,15 @@ def update(language: str) -> tuple[int, int]:
     """
     path = catalogue_path(language)
     with path.open("rb") as file:
-        before = {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
+        initial = {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
     catalog = Catalog(locale=language, project="Sagittal", fuzzy=False)
     catalog.header_comment = f"# {LANGUAGES[language]} texts of Sagittal (docs/how-to/languages.md)."
     messages = list_messages()
     for message, files in messages.items():
-        catalog.add(message, before.get(message, ""), locations=[(name, None) for name in files])  # type: ignore[misc]  # without lines
+        catalog.add(message, initial.get(message, ""), locations=[(name, None) for name in files])  # type: ignore[misc]  # without lines
     with path.open("wb") as file:
         write_po(file, catalog, width=110, sort_by_file=False, omit_header=False)
-    return len(messages), sum(not before.get(message) for message in messages)
+    return len(messages), sum(not initial.get(message) for message in messages)
 
 
 if __name__ == "__main__":

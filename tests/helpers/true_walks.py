@@ -1,4 +1,4 @@
-"""What a perfect analysis of a simulated walk would measure on: its true events, paths and angles."""
+"""Parameters that a perfect analysis of a simulated walk would give, from true events, paths and angles."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def standing_width(truth: WalkTruth) -> float:
 
 @keep
 def measured_walk(name: str, seed: int = 5) -> tuple[WalkTruth, MeasuredGait, MeasuredGait]:
-    """A named script: its truth, what is measured on the truth, and what the analysis measures."""
+    """Named script: ground truth, parameters from truth, and parameters from analysis."""
     take = simulate_scenario(name, seed)
     ahead = PLACES["foot_l"][0]
     shoe = Shoe(HEEL_M + ahead, TIP_M - ahead, TIP_UP_M)

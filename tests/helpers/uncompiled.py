@@ -10,13 +10,13 @@ from numba.core.dispatcher import Dispatcher
 
 
 def run_uncompiled(monkeypatch: pytest.MonkeyPatch, *modules: ModuleType) -> None:
-    """Let these modules, and those whose kernels they call, use their kernels as they are written."""
-    waiting, seen = list(modules), set[str]()
+    """Run the kernels of these modules, and of those they call, uncompiled."""
+    waiting, observations = list(modules), set[str]()
     while waiting:
         module = waiting.pop()
-        seen.add(module.__name__)
+        observations.add(module.__name__)
         for name, value in list(vars(module).items()):
             if isinstance(value, Dispatcher):
                 monkeypatch.setattr(module, name, value.py_func)
-                if value.py_func.__module__ not in seen:
+                if value.py_func.__module__ not in observations:
                     waiting.append(sys.modules[value.py_func.__module__])

@@ -67,13 +67,13 @@ def neura_walk() -> UniformRecording:
 
 @keep_recorded
 def neura_analysis() -> TakeAnalysis:
-    """What the product makes of it."""
+    """Analysis of the walk."""
     return analyse(neura_recording())
 
 
 @keep
 def analysed(name: str, seed: int = 0) -> TakeAnalysis:
-    """What the product makes of a named script."""
+    """Analysis of a named script."""
     return analyse(simulate_scenario(name, seed).recording)
 
 
@@ -82,10 +82,10 @@ def only(recording: UniformRecording, *segments: Segment) -> UniformRecording:
     return replace(recording, sensors={s: recording.sensors[s] for s in segments})
 
 
-def turned(recording: UniformRecording, by: dict[Segment, Floats]) -> UniformRecording:
+def turned(recording: UniformRecording, key: dict[Segment, Floats]) -> UniformRecording:
     """The same take with sensors mounted otherwise: v_new = q ⊗ v ⊗ q* for the quaternion of each segment."""
     sensors = {
-        s: replace(x, acc=rotate(by[s], x.acc), gyr=rotate(by[s], x.gyr), mag=None) if s in by else x
+        s: replace(x, acc=rotate(key[s], x.acc), gyr=rotate(key[s], x.gyr), mag=None) if s in key else x
         for s, x in recording.sensors.items()
     }
     return replace(recording, sensors=sensors)
@@ -137,15 +137,15 @@ def joint_gap(truth: WalkTruth) -> float:
     return float(max(gaps))
 
 
-def rms_deg(x: Floats, where: Bools | None = None) -> float:
+def rms_deg(x: Floats, location: Bools | None = None) -> float:
     """Root mean square in degrees of the finite values of x (rad)."""
-    x = x[np.isfinite(x) if where is None else where & np.isfinite(x)]
+    x = x[np.isfinite(x) if location is None else location & np.isfinite(x)]
     return float(np.degrees(np.sqrt(np.mean(x**2))))
 
 
-def assert_same_figures(found: Iterable[Parameter | Stride], expected: Iterable[Parameter | Stride]) -> None:
+def assert_same_figures(result: Iterable[Parameter | Stride], expected: Iterable[Parameter | Stride]) -> None:
     """The same in every field, to 1e-12: sums over arrays of another layout differ in their last bit."""
-    for a, b in zip(found, expected, strict=True):
+    for a, b in zip(result, expected, strict=True):
         assert [f for f in _flat(a) if not isinstance(f, float)] == [
             f for f in _flat(b) if not isinstance(f, float)
         ]

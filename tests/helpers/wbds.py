@@ -18,9 +18,9 @@ SIDE: dict[str, Side] = {"L": "left", "R": "right"}
 @cache
 def people() -> tuple[MeanCurves, ...]:
     """One stride per side of every person in degrees; skips where the data folder is absent."""
-    found: dict[str, dict[Side, dict[str, Floats]]] = {}
+    result: dict[str, dict[Side, dict[str, Floats]]] = {}
     with gzip.open(data_folder("norms") / "wbds_strides_42subjects.csv.gz", "rt", encoding="utf-8") as lines:
         for r in csv.DictReader(lines):
             curve = np.array([float(r[f"p{i}"]) for i in range(101)])
-            found.setdefault(r["subject"], {}).setdefault(SIDE[r["side"]], {})[r["variable"]] = curve
-    return tuple(found.values())
+            result.setdefault(r["subject"], {}).setdefault(SIDE[r["side"]], {})[r["variable"]] = curve
+    return tuple(result.values())

@@ -55,8 +55,8 @@ def outsiders(path: Path) -> set[str]:
         allowed = allowed | {"datetime"}
     if str(path).endswith(COMPILER):
         allowed = allowed | {"llvmlite"}
-    found = imported_packages(path.read_text("utf-8"))
-    return (found - allowed - set(sys.stdlib_module_names)) | (found & (EFFECTS - allowed))
+    result = imported_packages(path.read_text("utf-8"))
+    return (result - allowed - set(sys.stdlib_module_names)) | (result & (EFFECTS - allowed))
 
 
 def find_impure_imports() -> list[str]:

@@ -1,4 +1,4 @@
-"""Rules for tests: each asserts something, only benches limit seconds, and each lies at its mirrored path."""
+"""Test conventions: every test asserts, only benches limit seconds, and paths mirror the sources."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def functions(tree: ast.AST) -> Sequence[Function]:
 
 @cache
 def called(function: ast.AST) -> set[str]:
-    """Names of what is called, or waited in by `with`, without what stands before the dot."""
+    """Names of called functions and context managers, without their qualifier."""
     calls = (node.func for node in ast.walk(function) if isinstance(node, ast.Call))
     return {getattr(f, "attr", getattr(f, "id", "")) for f in calls}
 
@@ -46,11 +46,11 @@ def asserts(function: ast.AST) -> bool:
 
 
 def find_checking_names(trees: Iterable[ast.Module]) -> set[str]:
-    """Functions of tests and their helpers that assert, directly or by what they call."""
-    found = [f for tree in trees for f in functions(tree)]
-    names = EXPECT | {f.name for f in found if asserts(f)}
-    calls = [(f.name, called(f)) for f in found]
-    while more := {name for name, of in calls if name not in names and of & names}:
+    """Functions of tests and helpers that assert, directly or through their calls."""
+    result = [f for tree in trees for f in functions(tree)]
+    names = EXPECT | {f.name for f in result if asserts(f)}
+    calls = [(f.name, called(f)) for f in result]
+    while more := {name for name, source in calls if name not in names and source & names}:
         names |= more
     return names
 
@@ -67,7 +67,7 @@ def find_mute_tests(tree: ast.Module, checking: set[str]) -> list[str]:
 
 def find_limits_in_seconds(tree: ast.Module) -> list[str]:
     """Assertions that something took less than some time, as `test: assertion`."""
-    found = []
+    result = []
     for f in functions(tree):
         if any("bench" in ast.unparse(decorator) for decorator in f.decorator_list):
             continue
@@ -77,12 +77,12 @@ def find_limits_in_seconds(tree: ast.Module) -> list[str]:
         for node in ast.walk(f):
             if isinstance(node, ast.Assign) and _is_duration(node.value, names):
                 names |= {n.id for t in node.targets for n in ast.walk(t) if isinstance(n, ast.Name)}
-        found += [
+        result += [
             f"{f.name}: {ast.unparse(node)}"
             for node in ast.walk(f)
             if isinstance(node, ast.Assert) and any(_is_upper_limit(c, names) for c in ast.walk(node.test))
         ]
-    return found
+    return result
 
 
 def _is_duration(node: ast.AST, names: set[str]) -> bool:

@@ -20,7 +20,7 @@ VERBS = {"embed", "exceed", "feed", "need", "seed", "speed"}
 
 
 def is_participle(word: str) -> bool:
-    """Whether a word says what has been done instead of what to do."""
+    """Whether a word is a participle instead of an imperative."""
     return word in PARTICIPLES or (word.endswith("ed") and word not in VERBS)
 
 
@@ -82,12 +82,12 @@ NAMED_OTHERWISE: Mapping[str, str] = {
 """Module of server/api → why no service and no page has its name."""
 
 
-def find_strangers(modules: Iterable[str], homes: Collection[str], known: Collection[str]) -> list[str]:
+def find_strangers(modules: Iterable[str], homes: Collection[str], reference: Collection[str]) -> list[str]:
     """Modules without a namesake that no exception names, and exceptions that are none any more."""
-    alone = {name for name in modules if name not in homes}
+    single_names = {name for name in modules if name not in homes}
     return [
-        *sorted(alone - set(known)),
-        *(f"remove the exception: {name}" for name in sorted(set(known) - alone)),
+        *sorted(single_names - set(reference)),
+        *(f"remove the exception: {name}" for name in sorted(set(reference) - single_names)),
     ]
 
 

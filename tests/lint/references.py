@@ -1,7 +1,7 @@
-"""The repository stands alone: what code and documents refer to is in it, and nothing points outside.
+"""References in code and documents lead to existing targets in the repository, and none lead outside.
 
-References are pages and headings of docs/ in code and documents (`docs/page.md, "Heading"`), Markdown links
-with their anchors, and paths of source files.
+References are pages and headings of docs/ (`docs/page.md, "Heading"`), Markdown links with anchors, and paths
+of source files.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ def texts(root: Path) -> Iterator[tuple[Path, str]]:
     inside = [p for folder in FOLDERS for p in sorted((root / folder).rglob("*"))]
     for path in (*sorted(root.iterdir()), *inside):
         name = path.relative_to(root)
-        wanted = path.suffix in SUFFIXES or path.name in NAMES
-        if wanted and path.is_file() and name not in THESE:
+        expected = path.suffix in SUFFIXES or path.name in NAMES
+        if expected and path.is_file() and name not in THESE:
             yield name, path.read_text("utf-8")
 
 
@@ -61,7 +61,7 @@ def headings(page: Path) -> tuple[set[str], set[str]]:
 
 
 def one_line(path: Path, text: str) -> str:
-    """The text with the breaks of its lines taken out, so that a reference may go on in the next."""
+    """Text without line breaks, so that references may continue on the next line."""
     if path.suffix == ".py":
         text = re.sub(r'(?<=[^"\s])"\n\s*f?"(?!")', "", text)
     return re.sub(r"\n\s*(?:#|//|\*)? *", " ", text)
@@ -69,8 +69,8 @@ def one_line(path: Path, text: str) -> str:
 
 def missing(root: Path) -> list[str]:
     """References that lead nowhere, each with the file that has it."""
-    found = []
-    known: dict[Path, tuple[set[str], set[str]]] = {}
+    result = []
+    reference: dict[Path, tuple[set[str], set[str]]] = {}
     for path, text in texts(root):
         plain = one_line(path, text)
         targets = [(m, root / m.group().partition("#")[0]) for m in PAGE.finditer(plain)]
@@ -79,36 +79,36 @@ def missing(root: Path) -> list[str]:
             targets += [(m, (root / path).parent / (m[1].partition("#")[0] or path.name)) for m in local]
         for m, page in targets:
             if not page.exists() or not page.resolve().is_relative_to(root.resolve()):
-                found.append(f"{path}: {m.group()}")
+                result.append(f"{path}: {m.group()}")
                 continue
             if page.suffix != ".md":
                 continue
-            if page not in known:
-                known[page] = headings(page)
-            titles, anchors = known[page]
+            if page not in reference:
+                reference[page] = headings(page)
+            titles, anchors = reference[page]
             anchor = m.group().rstrip(")").partition("#")[2]
             if anchor and anchor not in anchors:
-                found.append(f"{path}: {m.group()}")
-            found += [
+                result.append(f"{path}: {m.group()}")
+            result += [
                 f"{path}: {page.name}, {title}" for title in cited(plain, m.end()) if title not in titles
             ]
-        found += [f"{path}: {m[0]}" for m in SOURCE.finditer(plain) if not (root / m[0]).exists()]
-    return found
+        result += [f"{path}: {m[0]}" for m in SOURCE.finditer(plain) if not (root / m[0]).exists()]
+    return result
 
 
-def cited(text: str, at: int) -> Iterator[str]:
-    """Headings named right behind a reference to a page."""
-    while (m := HEADINGS.match(text, at)) is not None:
+def cited(text: str, position: int) -> Iterator[str]:
+    """Headings named directly after a reference to a page."""
+    while (m := HEADINGS.match(text, position)) is not None:
         yield m[1] or m[2]
-        at = m.end()
+        position = m.end()
 
 
 def mentions(root: Path) -> list[str]:
-    """Mentions of what lies outside of the repository, each with the file that has it."""
+    """Mentions of files outside the repository, with the file that contains them."""
     return [
-        f"{path}: {what}, {m.group()}"
+        f"{path}: {label}, {m.group()}"
         for path, text in texts(root)
-        for what, pattern in OUTSIDE.items()
+        for label, pattern in OUTSIDE.items()
         for m in pattern.finditer(text)
     ]
 

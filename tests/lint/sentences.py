@@ -31,7 +31,7 @@ def _name(func: ast.expr) -> str:
 
 
 def _text(node: ast.expr) -> str:
-    """Text of a literal, values as one word; "" for what is computed elsewhere."""
+    """Text of a literal, with values as one word; "" for computed text."""
     if isinstance(node, ast.Constant):
         return node.value if isinstance(node.value, str) else ""
     if isinstance(node, ast.JoinedStr):

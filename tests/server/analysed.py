@@ -65,7 +65,7 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> TakeAnalysis:
         "walking_direction",
     )
     orientations = Orientations(tracks.t_s, 100.0, dict(tracks.q), dict(tracks.valid), "mahony")
-    found = TakeAnalysis(
+    take_analysis = TakeAnalysis(
         source=Recording({}, {}, sha256={"a.txt": "ff"}),
         version="1",
         uniform=uniform,
@@ -73,9 +73,9 @@ def analysis(*, duration_s: float = 12.0, reached: bool = True) -> TakeAnalysis:
         problem=problem,
     )
     if not reached:
-        return found
+        return take_analysis
     return replace(
-        found,
+        take_analysis,
         calibrated=CalibratedRecording(uniform, calibration),
         posed=PoseEstimate(orientations, walk.poses(duration_s), None),
         angles=tracks.angles,
@@ -115,7 +115,7 @@ def finish(
 
 
 def publish_next(clinic: Clinic, session_id: str, results: Mapping[str, bytes] | None = None) -> str:
-    """Do what a worker does with the next analysis that was asked for; returns the id of the shown one."""
+    """Process the next requested analysis like a worker; return the id of the current analysis."""
     state = clinic.app.state
     with clinic.db.read() as c:
         patient_id = sessions.get(c, session_id).patient_id

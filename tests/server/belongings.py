@@ -1,4 +1,4 @@
-"""One row of everything that belongs to a patient, and what the addresses of the routes need of it."""
+"""One row of everything that belongs to a patient, and the ids needed by the routes."""
 
 from __future__ import annotations
 
@@ -51,9 +51,9 @@ OF_NOBODY: Final = {
 
 def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
     """Add a patient to whom one of everything belongs; returns values by the names in addresses."""
-    ((other, sid),) = crowd.fill(clinic, 1, 2, analysed.files())
+    ((second, sid),) = crowd.fill(clinic, 1, 2, analysed.files())
     locum = clinic.user("clinician", "locum")
-    at, later = now(), now() + dt.timedelta(days=1)
+    stamp, later = now(), now() + dt.timedelta(days=1)
     ids = {name: new_id() for name in (
         "note_id", "consent_id", "upload_id", "tuning_id",
         "access_id", "run_id", "report_id", "link_id", "take_id",
@@ -67,29 +67,31 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
             make_keys(clinic.settings.identity_key_file)
         identities.change(c, clinic.settings.identity_key_file, None, pid, {"name": f"Person {code}"})
         written = prescriptions.write(c, clinic.app.state.reviewed, None, pid, TRAINING)
-        course = programmes.start(c, None, pid, starts_on=at.date())
-        once = {"job_id": done.job_id, "created_at": at, "code_version": "1"}
+        course = programmes.start(c, None, pid, starts_on=stamp.date())
+        single = {"job_id": done.job_id, "created_at": stamp, "code_version": "1"}
         sha = token_hash(ids["link_id"])
         c.execute(patient.update().where(patient.c.id == pid).values(code=code, note=f"note of {code}"))
         c.execute(session.update().where(session.c.patient_id == pid).values(title=f"visit of {code}"))
         for table, row in (
             (emergency_access, {"id": ids["access_id"], **of_patient, "user_id": locum,
-                                "reason": f"{code} fell", "opened_at": at - dt.timedelta(hours=5),
-                                "ends_at": at - dt.timedelta(hours=1)}),
-            (patient_note, {"id": ids["note_id"], **of_patient, "written_on": at.date(), "created_at": at,
-                            "content": f"{code} limps"}),
-            (consent, {"id": ids["consent_id"], **of_patient, "purpose": "sharing", "given_on": at.date(),
-                       "evidence": f"form of {code}", "created_at": at}),
-            (file_upload, {"id": ids["upload_id"], **of_visit, "name": "b.csv", "size": 9, "created_at": at}),
-            (reference_file, {**of_visit, "name": "optical.sto", "size": 1, "sha256": sha, "added_at": at}),
+                                "reason": f"{code} fell", "opened_at": stamp - dt.timedelta(hours=5),
+                                "ends_at": stamp - dt.timedelta(hours=1)}),
+            (patient_note, {"id": ids["note_id"], **of_patient, "written_on": stamp.date(),
+                            "created_at": stamp, "content": f"{code} limps"}),
+            (consent, {"id": ids["consent_id"], **of_patient, "purpose": "sharing", "given_on": stamp.date(),
+                       "evidence": f"form of {code}", "created_at": stamp}),
+            (file_upload, {"id": ids["upload_id"], **of_visit, "name": "b.csv", "size": 9,
+                           "created_at": stamp}),
+            (reference_file, {**of_visit, "name": "optical.sto", "size": 1, "sha256": sha,
+                              "added_at": stamp}),
             (tuning, {"id": ids["tuning_id"], "recording_id": took, "input_sha256": sha, "result": {},
-                      **once}),
-            (filter_run, {"id": ids["run_id"], "analysis_id": done.id, "settings": {}, **once}),
+                      **single}),
+            (filter_run, {"id": ids["run_id"], "analysis_id": done.id, "settings": {}, **single}),
             (signed_report, {"id": ids["report_id"], **of_visit, "number": 1, "analysis_id": done.id,
-                             "language": "en", "signed_at": at}),
+                             "language": "en", "signed_at": stamp}),
             (report_link, {"id": ids["link_id"], "report_id": ids["report_id"], "token_sha256": sha,
-                           "made_at": at, "expires_at": later, "openings": 0}),
-            (live_take, {"id": ids["take_id"], **of_visit, "state": "open", "created_at": at,
+                           "made_at": stamp, "expires_at": later, "openings": 0}),
+            (live_take, {"id": ids["take_id"], **of_visit, "state": "open", "created_at": stamp,
                          "token_sha256": sha, "token_expires_at": later}),
             (analysis_file, {"analysis_id": done.id, "name": f"sensitivity-{done.job_id[:8]}.json", "size": 2,
                              "sha256": sha}),
@@ -103,8 +105,8 @@ def add_belongings(clinic: Clinic, code: str) -> dict[str, str]:
         "patient_id": pid,
         "sid": sid,
         "session_id": sid,
-        "other": other,
-        "other_id": other,
+        "other": second,
+        "other_id": second,
         "analysis_id": done.id,
         "job_id": done.job_id,
         "sensitivity_id": done.job_id,
@@ -116,10 +118,10 @@ def fill_address(route: str, values: Mapping[str, str]) -> str:
     path = route.partition(" ")[2]
     named: Mapping[str, Any] = {"references": "optical.sto", "files": "walk.txt", "signals": "foot_pitch"}
 
-    def value(found: re.Match[str]) -> str:
-        before = path[: found.start()].rstrip("/").rsplit("/", 1)[-1]
-        if found[1] == "name":
-            return str(named.get(before, "stance_pct"))
-        return values[found[1]]
+    def value(result: re.Match[str]) -> str:
+        initial = path[: result.start()].rstrip("/").rsplit("/", 1)[-1]
+        if result[1] == "name":
+            return str(named.get(initial, "stance_pct"))
+        return values[result[1]]
 
     return re.sub(r"\{(\w+)(?::path)?\}", value, path)

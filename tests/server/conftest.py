@@ -41,7 +41,7 @@ def db(tmp_path: Path) -> Iterator[Database]:
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory: pytest.TempPathFactory, engine: str) -> Iterator[Clinic]:  # noqa: F811
-    """What services work on: database, files, queue and analyses of one clinic, which nobody serves."""
+    """Database, files, queue and analyses of one clinic without a server."""
     folder = tmp_path_factory.mktemp("stored")
     settings = Settings(data_dir=folder, database_url=choose_url(folder))
     if not settings.database_url:

@@ -1,4 +1,4 @@
-"""Many patients with many analysed visits in a clinic, written in bulk: what a page costs once it is full."""
+"""Bulk creation of many patients with analysed visits, for page cost measurements."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def fill(
     *,
     controls: bool = False,
 ) -> list[list[str]]:
-    """Add people who came on `visits` days each; returns the sessions of every person, oldest first.
+    """Add people with one visit on each of `visits` days; return each person's sessions, oldest first.
 
     Parameters
     ----------
-    results : files of every visit's analysis; None = an analysis whose files nobody can open.
-    controls : the people serve as reference of the clinic.
+    results : analysis files of every visit; None = unreadable files.
+    controls : the people serve as the clinic's reference.
     """
     rows: Rows = {table: [] for table in TABLES}
     people = []
@@ -64,37 +64,37 @@ def fill(
         stored = {name: blobs.put(person, content) for name, content in (results or {}).items()}
         people.append([_visit(rows, person, day, stored) for day in range(visits)])
     with clinic.db.write() as c:
-        for table, made in rows.items():
-            if made:
-                c.execute(insert(table), made)
+        for table, result in rows.items():
+            if result:
+                c.execute(insert(table), result)
     return people
 
 
 def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str:
     sid, rid, jid, aid = (new_id() for _ in range(4))
-    at = MORNING + dt.timedelta(days=day)
+    position = MORNING + dt.timedelta(days=day)
     mapped = {"sensors": {"A1": "pelvis"}}
     rows[session].append(
         {"id": sid, "patient_id": person, "title": "Walk", "performed_on": FIRST_DAY + dt.timedelta(days=day),
-         "protocol": "walk", "note": "", "created_at": at}
+         "protocol": "walk", "note": "", "created_at": position}
     )  # fmt: skip
     rows[recording].append(
-        {"id": rid, "session_id": sid, "manifest": mapped, "wanted_key": rid, "created_at": at}
+        {"id": rid, "session_id": sid, "manifest": mapped, "wanted_key": rid, "created_at": position}
     )
     rows[recording_file].append(
-        {"recording_id": rid, "name": "walk.txt", "size": 9, "sha256": "0" * 64, "added_at": at}
+        {"recording_id": rid, "name": "walk.txt", "size": 9, "sha256": "0" * 64, "added_at": position}
     )
     rows[job].append(
         {"id": jid, "key": rid, "kind": "analyse", "recording_id": rid, "params": {}, "priority": 0,
-         "state": "done", "attempt": 1, "deaths": 0, "cancel_requested": False, "created_at": at,
-         "started_at": at, "finished_at": at}
+         "state": "done", "attempt": 1, "deaths": 0, "cancel_requested": False, "created_at": position,
+         "started_at": position, "finished_at": position}
     )  # fmt: skip
     rows[analysis].append(
         {"id": aid, "recording_id": rid, "job_id": jid, "input_sha256": "0" * 64, "config_sha256": "0" * 64,
-         "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": at}
+         "code_version": CODE_VERSION, "manifest": mapped, "config": {}, "created_at": position}
     )  # fmt: skip
     rows[device_check] += [
-        {"recording_id": rid, "device_id": device, "segment": segment, "exchanged": False, "at": at,
+        {"recording_id": rid, "device_id": device, "segment": segment, "exchanged": False, "at": position,
          "content": DeviceCheck(device, 100.0, reason="no_rest").to_json()}
         for device, segment in zip(DEVICES, SEGMENTS, strict=False)
     ]  # fmt: skip
@@ -107,10 +107,10 @@ def _visit(rows: Rows, person: str, day: int, stored: Mapping[str, Blob]) -> str
 
 @contextlib.contextmanager
 def statements() -> Iterator[list[str]]:
-    """Every statement that is sent for what is asked meanwhile, but for what begins a transaction."""
+    """SQL statements executed meanwhile, without those that begin transactions."""
     sent: list[str] = []
 
-    def note(c: object, cursor: object, statement: str, *rest: object) -> None:
+    def note(c: object, cursor: object, statement: str, *remainder: object) -> None:
         if _asking.get() and not statement.startswith("BEGIN"):
             sent.append(statement)
 

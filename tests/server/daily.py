@@ -1,4 +1,4 @@
-"""A recording of daily life whose every minute is known, as the monitor would tell it, and as files."""
+"""Daily-life recording with known activity in every minute, as monitor result and as files."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ LEAN: Final = {"lying": -88.0, "sitting": 6.0, "standing": 1.0, "walking": 3.0, 
 def live(days: float = 2.0, *, clock: bool = True, height_m: float = 1.75) -> ActivityResult:
     """So many days of DAY, with a clock from STARTED on."""
     spans: list[ActivitySpan] = []
-    at, end = 0.0, days * 86400.0
-    while at < end:
+    position, end = 0.0, days * 86400.0
+    while position < end:
         for kind, hours in DAY:
-            upto = min(at + hours * 3600.0, end)
-            if upto > at:
-                spans.append(ActivitySpan(at, upto, kind, 1.0, "both_ends"))
-            at = upto
+            upto = min(position + hours * 3600.0, end)
+            if upto > position:
+                spans.append(ActivitySpan(position, upto, kind, 1.0, "both_ends"))
+            position = upto
     bouts = tuple(_walk(s) for s in spans if s.kind in ("walking", "stairs_up"))
     steps: Floats = np.concatenate([np.linspace(b.start_s, b.end_s, b.steps) for b in bouts] or [np.empty(0)])
     seats = [s for s in spans if s.kind in ("sitting", "standing") and s.end_s < end]
@@ -91,11 +91,11 @@ def live(days: float = 2.0, *, clock: bool = True, height_m: float = 1.75) -> Ac
     )
 
 
-def files(found: ActivityResult) -> Mapping[str, bytes]:
+def files(result: ActivityResult) -> Mapping[str, bytes]:
     """The files that a worker stores of it."""
-    report = QualityReport("good", (), found.duration_s, found.rate_hz, MappingProxyType({}), (), ())
+    report = QualityReport("good", (), result.duration_s, result.rate_hz, MappingProxyType({}), (), ())
     source = Recording({}, {}, protocol="activity", sha256={"day.cwa": "ff"})
-    return analysis_files(TakeAnalysis(source=source, version="1", report=report, activity=found))
+    return analysis_files(TakeAnalysis(source=source, version="1", report=report, activity=result))
 
 
 def _walk(s: ActivitySpan) -> ActivityBout:

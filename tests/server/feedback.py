@@ -22,14 +22,14 @@ DAY = dt.date(2026, 3, 2)
 
 def person(clinic: Clinic, **changes: Any) -> str:
     """A patient whose left side is affected."""
-    known: dict[str, Any] = {
+    known_fields: dict[str, Any] = {
         "height_m": 1.75,
         "birth_year": 1960,
         "sex": "male",
         "affected_side": "left",
     } | changes
     with clinic.db.write() as c:
-        return patients.create(c, None, code=f"P-{new_id()[:8]}", **known).id
+        return patients.create(c, None, code=f"P-{new_id()[:8]}", **known_fields).id
 
 
 def visit(clinic: Clinic, patient: str, days: int, **values: Any) -> str:
@@ -49,9 +49,9 @@ def take(
     clinic: Clinic, session: str, prescription: str, cues: Sequence[Cue], recording: str | None = None
 ) -> str:
     """A live take of a session with this prescription in force, as `ended_take`."""
-    begun, made = ended_take(clinic.db, clinic.app.state.blobs, session, cues, recording)
+    begun, result = ended_take(clinic.db, clinic.app.state.blobs, session, cues, recording)
     assert begun.prescription_id == prescription
-    return made
+    return result
 
 
 def ended_take(
@@ -59,13 +59,13 @@ def ended_take(
 ) -> tuple[live_training.LiveTraining, str]:
     """A take that gave these cues and has ended as this recording: how it began, and its id."""
     with db.write() as c:
-        made, code = live.open_take(c, None, session)
+        result, code = live.open_take(c, None, session)
         live.pair(c, code)
-    begun = live_training.training_of(db, ReviewedAnalyses(blobs), made)
+    begun = live_training.training_of(db, ReviewedAnalyses(blobs), result)
     with db.write() as c:
-        live.note_start(c, made.id, "replay")
+        live.note_start(c, result.id, "replay")
         for cue in cues:
-            live_events.add_event(c, None, made.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
-        live.end(c, None, made.id, "finished", count=1)
-        c.execute(live_take.update().where(live_take.c.id == made.id).values(recording_id=recording))
-    return begun, made.id
+            live_events.add_event(c, None, result.id, "cue", cue.t_s, {"type": "cue", **cue.to_json()})
+        live.end(c, None, result.id, "finished", count=1)
+        c.execute(live_take.update().where(live_take.c.id == result.id).values(recording_id=recording))
+    return begun, result.id

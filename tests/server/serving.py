@@ -1,4 +1,4 @@
-"""An application behind a real uvicorn on a loopback port, for what a transport in memory cannot show."""
+"""Application behind a real uvicorn on a loopback port, where an in-memory transport is not enough."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ async def serve(app: Any, settings: Settings | None = None, **limits: Any) -> As
 async def serving(
     app: Any, settings: Settings | None = None, **limits: Any
 ) -> AsyncIterator[tuple[int, uvicorn.Server]]:
-    """Serve, and tell the server too."""
+    """Serve, and also return the server."""
     with open_listener("127.0.0.1", 0) as listener:
         server = build_server(app, settings or Settings(), ConnectionLimits(**limits))
         server.config.lifespan = "off"

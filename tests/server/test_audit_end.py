@@ -1,4 +1,4 @@
-"""Whoever cuts the newest rows off the audit log leaves a whole chain behind; `check` notices it."""
+"""A truncated audit log is a valid chain; `check` detects the truncation."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ ROWS = 6
 @pytest.fixture
 def settings(tmp_path: Path) -> Settings:
     """A data folder whose audit log has six rows, and the mark that a server leaves."""
-    made = Settings(data_dir=tmp_path)
-    write_database(made.database)
-    with closing(Database(made.database)) as db:
+    result = Settings(data_dir=tmp_path)
+    write_database(result.database)
+    with closing(Database(result.database)) as db:
         with db.write() as c:
             for i in range(ROWS):
                 patients.create(c, None, code=f"P-{i}")
-        raise_mark(db, made.mark)
-    return made
+        raise_mark(db, result.mark)
+    return result
 
 
-def cut(settings: Settings, kept: int) -> Database:
-    """Remove the newest rows, as somebody would who has the file in hand."""
+def cut(settings: Settings, retained: int) -> Database:
+    """Remove the newest rows like an attacker with file access."""
     db = Database(settings.database)
     with db.write() as c:
         c.exec_driver_sql("DROP TRIGGER audit_no_delete")
-        c.exec_driver_sql("DELETE FROM audit WHERE seq > ?", (kept,))
+        c.exec_driver_sql("DELETE FROM audit WHERE seq > ?", (retained,))
     return db
 
 
@@ -68,8 +68,8 @@ def test_a_cut_end_is_noticed_without_the_mark(
     settings.mark.unlink()
     cut(settings, kept).close()
     assert check(data_dir=settings.data_dir) == 1
-    said = capsys.readouterr().out
-    assert f"audit: audit rows {kept + 1} to {ROWS}, the newest, have been removed" in said
+    stdout = capsys.readouterr().out
+    assert f"audit: audit rows {kept + 1} to {ROWS}, the newest, have been removed" in stdout
 
 
 @pytest.mark.parametrize("kept", [0, 3, ROWS - 1])
@@ -79,8 +79,8 @@ def test_a_cut_end_is_noticed_by_the_mark_when_the_tables_own_number_was_set_bac
     with closing(cut(settings, kept)) as db, db.write() as c:
         c.exec_driver_sql("UPDATE sqlite_sequence SET seq = ? WHERE name = 'audit'", (kept,))
     assert check(data_dir=settings.data_dir) == 1
-    said = capsys.readouterr().out
-    assert f"audit: The audit log ends at row {kept}, but had reached row {ROWS}" in said
+    stdout = capsys.readouterr().out
+    assert f"audit: The audit log ends at row {kept}, but had reached row {ROWS}" in stdout
 
 
 def test_an_end_that_was_written_anew_is_noticed(

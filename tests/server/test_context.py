@@ -39,14 +39,14 @@ def app() -> FastAPI:
 @pytest.fixture
 async def client(app: FastAPI) -> AsyncIterator[httpx.AsyncClient]:
     transport = httpx.ASGITransport(app, client=("192.0.2.7", 5000))
-    async with httpx.AsyncClient(transport=transport, base_url="http://clinic") as made:
-        yield made
+    async with httpx.AsyncClient(transport=transport, base_url="http://clinic") as async_client:
+        yield async_client
 
 
 @pytest.mark.parametrize("name", PARTS)
 async def test_every_part_is_the_one_of_this_name(app: FastAPI, client: httpx.AsyncClient, name: str) -> None:
-    for known in PARTS:
-        setattr(app.state, known, f"the {known}")
+    for reference in PARTS:
+        setattr(app.state, reference, f"the {reference}")
 
     async def ask(part: Any) -> str:
         return str(part)
@@ -64,13 +64,13 @@ def test_every_part_has_the_type_that_the_state_gives_it() -> None:
 @pytest.fixture
 def choices(app: FastAPI) -> list[StudyChoice]:
     """Every choice that an endpoint got."""
-    found: list[StudyChoice] = []
+    result: list[StudyChoice] = []
 
     @app.get("/study")
     async def study(choice: StudyVisits) -> None:
-        found.append(choice)
+        result.append(choice)
 
-    return found
+    return result
 
 
 A, B = "a" * 32, "b" * 32
@@ -111,8 +111,8 @@ async def test_more_visits_than_a_hundred_are_refused(
     client: httpx.AsyncClient, choices: list[StudyChoice]
 ) -> None:
     for number, status in ((100, 200), (101, 422)):
-        asked = "&".join(f"visit={i:032x}" for i in range(number))
-        assert (await client.get(f"/study?{asked}")).status_code == status
+        requested_text = "&".join(f"visit={i:032x}" for i in range(number))
+        assert (await client.get(f"/study?{requested_text}")).status_code == status
     assert len(choices) == 1
 
 

@@ -1,4 +1,4 @@
-"""What the web process opens and closes, and what it says of its parts."""
+"""Resources opened and closed by the web process, and its status messages."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from tests.helpers.databases import write_database
 @pytest.fixture
 def app(tmp_path: Path) -> FastAPI:
     """An application without routes, on an empty clinic without estimators."""
-    made, settings = FastAPI(), Settings(data_dir=tmp_path, live_workers=0)
-    made.state = State({"settings": settings, "metrics": RequestMetrics()})
+    fast_a_p_i, settings = FastAPI(), Settings(data_dir=tmp_path, live_workers=0)
+    fast_a_p_i.state = State({"settings": settings, "metrics": RequestMetrics()})
     write_database(settings.database)
-    return made
+    return fast_a_p_i
 
 
 def settings_of(app: FastAPI) -> Settings:
-    found = app.state.settings
-    assert isinstance(found, Settings)
-    return found
+    result = app.state.settings
+    assert isinstance(result, Settings)
+    return result
 
 
 @pytest.mark.anyio
@@ -79,9 +79,9 @@ def test_workers_that_nobody_started_are_no_fault_and_those_that_died_are_counte
     state = State({"settings": settings_of(app)})
     assert _say_workers(state) == "ok"
     state.workers = Workers(state.settings)
-    wanted = state.settings.workers
-    assert wanted > 0
-    assert _say_workers(state) == f"0 of {wanted} worker processes run; see the server's log."
+    expected_workers = state.settings.workers
+    assert expected_workers > 0
+    assert _say_workers(state) == f"0 of {expected_workers} worker processes run; see the server's log."
 
 
 @pytest.mark.parametrize(

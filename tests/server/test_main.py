@@ -1,4 +1,4 @@
-"""The command line as a whole: how it is told what it can do, and how wrong words are answered."""
+"""Command line: help, and responses to invalid arguments."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def test_no_command_loads_numba_before_it_runs() -> None:
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_says_what_it_takes(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([name, "--help"]) == 0
-    said = re.sub(r"\s+", " ", capsys.readouterr().out)
-    assert COMMANDS[name] in said
+    message = re.sub(r"\s+", " ", capsys.readouterr().out)
+    assert COMMANDS[name] in message
     function = name.replace("-", "_")
     module = importlib.import_module(find_module(name))
     for parameter in inspect.signature(getattr(module, function)).parameters.values():
         is_option = parameter.kind is inspect.Parameter.KEYWORD_ONLY
-        assert ("--" in said) if is_option else (parameter.name.upper() in said)
+        assert ("--" in message) if is_option else (parameter.name.upper() in message)
 
 
 WRONG = {
@@ -74,11 +74,11 @@ def test_wrong_words_are_one_sentence_and_exit_2(
 
 def test_values_come_before_and_after_what_has_no_name() -> None:
     words = ["tune", "--validate", "a", "b", "--no-magnetometer", "--algorithm", "m", "d"]
-    _, given, _ = make_app().parse_args(words, exit_on_error=False)
-    assert given.args == (Path("d"),)
-    assert given.kwargs == {"validation": ("a", "b"), "magnetometer": False, "algorithm": "m"}
-    _, given, _ = make_app().parse_args(
+    _, inputs, _ = make_app().parse_args(words, exit_on_error=False)
+    assert inputs.args == (Path("d"),)
+    assert inputs.kwargs == {"validation": ("a", "b"), "magnetometer": False, "algorithm": "m"}
+    _, inputs, _ = make_app().parse_args(
         ["stairs", "a", "b", "--level", "-1", "2", "--up", "0", "1", "--down=3", "4", "--out", "x"]
     )
-    assert given.args == ([Path("a"), Path("b")],)
-    assert given.kwargs["level"] == (-1.0, 2.0)
+    assert inputs.args == ([Path("a"), Path("b")],)
+    assert inputs.kwargs["level"] == (-1.0, 2.0)

@@ -90,15 +90,15 @@ def angles(duration_s: float = 12.0, rate_hz: float = 100.0) -> JointAngles:
 
 def events(duration_s: float = 12.0) -> GaitEvents:
     """Contacts of the walk at whole phases."""
-    found = []
+    result = []
     for side in SIDES:
         for k in range(-1, int(duration_s / STRIDE_S) + 2):
             start = (k - PHASE[side]) * STRIDE_S
             for kind, t in (("ic", start), ("tc", start + FOOT_OFF * STRIDE_S)):
                 if 0 <= t < duration_s:
                     name: EventKind = "ic" if kind == "ic" else "tc"
-                    found.append(GaitEvent(t, side, name, "foot_contact", t, uncertainty_s=0.02))
-    return GaitEvents(tuple(sorted(found, key=lambda e: e.time_s)))
+                    result.append(GaitEvent(t, side, name, "foot_contact", t, uncertainty_s=0.02))
+    return GaitEvents(tuple(sorted(result, key=lambda e: e.time_s)))
 
 
 def strides(duration_s: float = 12.0) -> Strides:
@@ -107,7 +107,7 @@ def strides(duration_s: float = 12.0) -> Strides:
     out = []
     for side in SIDES:
         ic = contacts.times(side, "ic")
-        other: Side = "right" if side == "left" else "left"
+        other_side: Side = "right" if side == "left" else "left"
         for k, (a, b) in enumerate(itertools.pairwise(ic)):
             out.append(
                 Stride(
@@ -115,8 +115,8 @@ def strides(duration_s: float = 12.0) -> Strides:
                     start_s=a,
                     tc_s=_inside(contacts.times(side, "tc"), a, b),
                     end_s=b,
-                    opposite_tc_s=_inside(contacts.times(other, "tc"), a, b),
-                    opposite_ic_s=_inside(contacts.times(other, "ic"), a, b),
+                    opposite_tc_s=_inside(contacts.times(other_side, "tc"), a, b),
+                    opposite_ic_s=_inside(contacts.times(other_side, "ic"), a, b),
                     turn_rad=0.01,
                     excluded_reason="first" if k == 0 else None,
                 )
@@ -126,35 +126,35 @@ def strides(duration_s: float = 12.0) -> Strides:
 
 def tracks(duration_s: float = 12.0) -> Tracks:
     """What strides and parameters of the walk are measured on; the foot that carries rests."""
-    made = poses(duration_s)
-    whole = dict.fromkeys(SIDES, made.valid)
+    result = poses(duration_s)
+    whole = dict.fromkeys(SIDES, result.valid)
     feet = FootTracks(
-        t_s=made.t_s,
-        rate_hz=made.rate_hz,
-        p={side: made.p[FOOT[side]] for side in SIDES},
-        q={side: made.q[FOOT[side]] for side in SIDES},
-        still={side: _flat(made, side) for side in SIDES},
+        t_s=result.t_s,
+        rate_hz=result.rate_hz,
+        p={side: result.p[FOOT[side]] for side in SIDES},
+        q={side: result.q[FOOT[side]] for side in SIDES},
+        still={side: _flat(result, side) for side in SIDES},
         valid=whole,
         linked=True,
         source="kinematic",
         body=BODY,
     )
     return Tracks(
-        t_s=made.t_s,
-        rate_hz=made.rate_hz,
+        t_s=result.t_s,
+        rate_hz=result.rate_hz,
         events=events(duration_s),
-        q={FOOT[side]: made.q[FOOT[side]] for side in SIDES},
-        valid={FOOT[side]: made.valid for side in SIDES},
-        turning=np.zeros(len(made.t_s), bool),
+        q={FOOT[side]: result.q[FOOT[side]] for side in SIDES},
+        valid={FOOT[side]: result.valid for side in SIDES},
+        turning=np.zeros(len(result.t_s), bool),
         feet=feet,
         angles=angles(duration_s),
-        trunk={"pelvis": np.stack((0 * made.t_s, 0 * made.t_s, np.sin(made.t_s)), axis=1)},
+        trunk={"pelvis": np.stack((0 * result.t_s, 0 * result.t_s, np.sin(result.t_s)), axis=1)},
     )
 
 
-def _flat(made: Poses, side: Side) -> Bools:
+def _flat(result: Poses, side: Side) -> Bools:
     """The middle of the stance."""
-    phase = (made.t_s / STRIDE_S + PHASE[side]) % 1.0
+    phase = (result.t_s / STRIDE_S + PHASE[side]) % 1.0
     return (phase > 0.15) & (phase < 0.35)
 
 

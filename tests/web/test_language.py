@@ -97,9 +97,9 @@ def test_no_message_of_the_sources_is_guessed(language: str, monkeypatch: pytest
     catalogue = load_catalogue(language)
     guessed: list[str] = []
     monkeypatch.setattr(SentenceFinder, "find", lambda _, text: guessed.append(text))
-    known = {t for _, t in TEMPLATES if t in catalogue.messages}
-    assert len(known) > 200
-    for template in known:
+    reference = {t for _, t in TEMPLATES if t in catalogue.messages}
+    assert len(reference) > 200
+    for template in reference:
         message = Message(template, **dict.fromkeys(PLACEHOLDER.findall(template), 7))
         text = catalogue.translate(message)
         assert not PLACEHOLDER.search(text)

@@ -1,4 +1,4 @@
-"""The stylesheets style what is there: no class without a use, no class of a page without a rule."""
+"""Stylesheets match the pages: no unused class, no class without a rule."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def test_every_styled_class_is_used() -> None:
 
 
 def test_every_class_of_a_template_is_styled() -> None:
-    found = {name for name in template_attributes() if ANY not in name}
-    unstyled = found - styled_classes()
+    names = {name for name in template_attributes() if ANY not in name}
+    unstyled = names - styled_classes()
     assert unstyled == HOOKS, f"no rule for {sorted(unstyled - HOOKS)}; not there {sorted(HOOKS - unstyled)}"
 
 
@@ -50,13 +50,13 @@ def test_the_finders_find() -> None:
 
 def styled_classes() -> set[str]:
     """Return the classes that the selectors of all stylesheets name."""
-    found: set[str] = set()
+    result: set[str] = set()
     for sheet in WEB.rglob("*.css"):
         text = re.sub(r"/\*.*?\*/", "", sheet.read_text(), flags=re.DOTALL)
         for selector in re.findall(r"([^{};]+)\{", text):
             if not selector.lstrip().startswith("@"):
-                found.update(re.findall(r"\.([a-zA-Z_][\w-]*)", selector))
-    return found
+                result.update(re.findall(r"\.([a-zA-Z_][\w-]*)", selector))
+    return result
 
 
 def template_attributes() -> Iterator[str]:
@@ -70,7 +70,7 @@ def template_attributes() -> Iterator[str]:
 
 
 def template_classes() -> Iterator[str]:
-    """Yield the classes of templates, also of blocks and of what is handed to macros."""
+    """Yield classes of templates, including blocks and macro arguments."""
     yield from template_attributes()
     for text in templates():
         for expression in re.findall(r"\{[{%](.*?)[%}]\}", text, flags=re.DOTALL):
@@ -87,7 +87,7 @@ def templates() -> Iterator[str]:
 
 
 def script_classes() -> Iterator[str]:
-    """Yield what may be a class in the strings of all scripts."""
+    """Yield possible class names in strings of all scripts."""
     for path in (WEB / "static" / "js").rglob("*.js"):
         text = re.sub(r"^\s*//.*$", "", path.read_text(), flags=re.MULTILINE)
         yield from classes_in(re.findall(r'"([^"\n]*)"', text))
@@ -95,7 +95,7 @@ def script_classes() -> Iterator[str]:
 
 
 def python_classes() -> Iterator[str]:
-    """Yield what may be a class in the strings of the Python code that draws."""
+    """Yield possible class names in strings of Python drawing code."""
     for path in (p for folder in SOURCES for p in folder.rglob("*.py")):
         yield from classes_in(strings_of(path))
 
@@ -122,10 +122,10 @@ def classes_in(texts: Iterator[str] | list[str]) -> Iterator[str]:
 
 def test_only_links_are_underlined_under_the_pointer() -> None:
     """A fold that shares a class with plain links was underlined as a whole, fields and all."""
-    found: list[str] = []
+    names: list[str] = []
     for sheet in WEB.rglob("*.css"):
         for selectors, rules in re.findall(r"([^{};]+:hover)\s*\{([^{}]*)\}", sheet.read_text()):
             if "text-decoration: underline" in rules:
-                found += [s.strip() for s in selectors.split(",")]
-    assert found
-    assert [s for s in found if not re.search(r"\ba(\.[\w-]+)?:hover$", s)] == []
+                names += [s.strip() for s in selectors.split(",")]
+    assert names
+    assert [s for s in names if not re.search(r"\ba(\.[\w-]+)?:hover$", s)] == []

@@ -42,7 +42,7 @@ def test_a_template_can_be_read(path: Path) -> None:
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=lambda p: p.name)
 def test_a_text_of_many_lines_has_a_limit_that_cuts_nothing(path: Path) -> None:
-    """With `maxlength` a browser drops the end of what is pasted; `data-limit` counts, and keeps it."""
+    """`maxlength` makes browsers truncate pasted text; `data-limit` counts and keeps it."""
     for area in re.findall(r"<textarea\b.*?>", path.read_text(), re.DOTALL):
         assert "data-limit=" in area, area
         assert "maxlength=" not in area, area
@@ -62,7 +62,7 @@ def test_every_part_is_used() -> None:
 
 
 def test_macros_that_use_nothing_of_a_page_are_made_once() -> None:
-    """Imported with the context of a page, all macros of a file are made anew for every template of it."""
+    """Macros imported with the page context would be compiled for every template."""
     env = load_templates("en").env
     anew = {
         (path.name, name)
@@ -84,6 +84,6 @@ def test_no_page_takes_the_name_by_which_the_navigation_knows_where_it_is() -> N
 
 
 def test_a_unit_stands_on_the_line_of_the_last_word() -> None:
-    """A degree sign alone on a line of its own, in the narrow columns of the values."""
+    """Degree signs stay on the line of their number in narrow columns."""
     macros = load_templates("en").env.get_template("_params.html").module
     assert str(macros.unit("°")).startswith("&nbsp;<span")  # type: ignore[attr-defined]

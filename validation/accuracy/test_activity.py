@@ -50,14 +50,14 @@ SEATED_S, RISING_S = (4.0, 12.0), (39.0, 55.0)
 
 @keep
 def lived(seed: int) -> tuple[DailySimulation, ActivityResult]:
-    made = simulate_daily_life(plan_daily_life(24.0, seed), 1.6 + 0.01 * (seed % 30), seed, 25.0)
-    found = monitor_activity(made.stream, "chest", made.height_m)
+    daily_life = simulate_daily_life(plan_daily_life(24.0, seed), 1.6 + 0.01 * (seed % 30), seed, 25.0)
+    activity = monitor_activity(daily_life.stream, "chest", daily_life.height_m)
     # the recipe of the samples cannot be kept
-    return replace(made, stream=replace(made.stream, open_blocks=tuple)), found  # type: ignore[arg-type]
+    return replace(daily_life, stream=replace(daily_life.stream, open_blocks=tuple)), activity  # type: ignore[arg-type]
 
 
 def minutes_of(kinds: Sequence[tuple[float, float, str]], duration_s: float) -> list[str]:
-    """What was done longest in every whole minute."""
+    """Dominant activity in every whole minute."""
     sums: list[Counter[str]] = [Counter() for _ in range(int(duration_s // 60))]
     for a, b, kind in kinds:
         for i in range(int(a // 60), min(len(sums), int(b // 60) + 1)):
@@ -68,19 +68,23 @@ def minutes_of(kinds: Sequence[tuple[float, float, str]], duration_s: float) -> 
 def test_a_simulated_day_minute_by_minute() -> None:
     rows, total = [], Counter[tuple[str, str]]()
     for seed in DAYS:
-        made, found = lived(seed)
-        true = [(p.start_s, p.end_s, KIND_OF.get(p.kind, "change")) for p in made.phases]
-        told = [(s.start_s, s.end_s, s.kind) for s in found.spans]
-        pairs = zip(minutes_of(true, found.duration_s), minutes_of(told, found.duration_s), strict=True)
+        result, results = lived(seed)
+        true = [(p.start_s, p.end_s, KIND_OF.get(p.kind, "change")) for p in result.phases]
+        notices = [(s.start_s, s.end_s, s.kind) for s in results.spans]
+        pairs = zip(
+            minutes_of(true, results.duration_s), minutes_of(notices, results.duration_s), strict=True
+        )
         total.update(pairs)
-        assert len(found.steps_s) == pytest.approx(len(made.steps_s), rel=0.03)
-        changes = [p for p in made.phases if "_to_" in p.kind]
+        assert len(results.steps_s) == pytest.approx(len(result.steps_s), rel=0.03)
+        changes = [p for p in result.phases if "_to_" in p.kind]
         met = sum(
-            any(t.kind == p.kind and p.start_s - 1.0 <= t.time_s <= p.end_s + 1.0 for t in found.transitions)
+            any(
+                t.kind == p.kind and p.start_s - 1.0 <= t.time_s <= p.end_s + 1.0 for t in results.transitions
+            )
             for p in changes
         )
         assert met >= 0.97 * len(changes)
-        assert len(found.transitions) <= 1.03 * len(changes)
+        assert len(results.transitions) <= 1.03 * len(changes)
     for kind in ("lying", "sitting", "standing", "walking", "non_wear"):
         own = {b: n for (a, b), n in total.items() if a == kind}
         share = own.get(kind, 0) / sum(own.values())
@@ -108,22 +112,22 @@ def test_people_as_in_the_thesis() -> None:
         style = ChestStyle(
             float(rng.uniform(radians(25), radians(45))), float(rng.uniform(1.5, 3.5)), sway_m=0.02
         )
-        made = simulate_day(STUDY, float(rng.uniform(1.55, 1.9)), seed, replace(ON_SKIN, rate_hz=50.0), style)
-        (stream,) = made.recording.streams.values()
-        found = monitor_activity(as_long_stream(stream), "chest", made.recording.subject.height_m)
-        changes = [p for p in made.truth.phases if "_to_" in p.kind]
+        day = simulate_day(STUDY, float(rng.uniform(1.55, 1.9)), seed, replace(ON_SKIN, rate_hz=50.0), style)
+        (stream,) = day.recording.streams.values()
+        activity = monitor_activity(as_long_stream(stream), "chest", day.recording.subject.height_m)
+        changes = [p for p in day.truth.phases if "_to_" in p.kind]
         used = set()
         for p in changes:
             number[p.kind] += 1
             middle = 0.5 * (p.start_s + p.end_s)
-            for t in found.transitions:
+            for t in activity.transitions:
                 if t.kind == p.kind and abs(t.time_s - middle) <= 2.0:
                     hits[p.kind] += 1
                     used.add(t.time_s)
                     times["lying" if "lie" in p.kind else "sitting"].append(abs(t.time_s - middle))
-        extra += len(found.transitions) - len(used)
-        steps += len(found.steps_s)
-        walked += len(made.truth.steps_s)
+        extra += len(activity.transitions) - len(used)
+        steps += len(activity.steps_s)
+        walked += len(day.truth.steps_s)
     names = {"stand_to_sit": "StSi", "sit_to_stand": "SiSt", "sit_to_lie": "SiLy", "lie_to_sit": "LySi"}
     published = {"StSi": "100 ± 0", "SiSt": "98 ± 4", "SiLy": "100 ± 0", "LySi": "100 ± 0"}
     rows = [
@@ -161,8 +165,8 @@ def watch_qmt(name: str, segment: Segment, *, gyro: bool) -> ActivityResult:
     return monitor_activity(as_long_stream(stream), segment, 1.75)
 
 
-def share_of(found: ActivityResult, kinds: tuple[str, ...], window: tuple[float, float]) -> float:
-    inside = (min(s.end_s, window[1]) - max(s.start_s, window[0]) for s in found.spans if s.kind in kinds)
+def share_of(result: ActivityResult, kinds: tuple[str, ...], window: tuple[float, float]) -> float:
+    inside = (min(s.end_s, window[1]) - max(s.start_s, window[0]) for s in result.spans if s.kind in kinds)
     return sum(x for x in inside if x > 0.0) / (window[1] - window[0])
 
 
@@ -180,17 +184,17 @@ def test_a_person_sits_down_and_stands_up() -> None:
     rows = []
     for name, segment in WORN.items():
         for gyro in (False, True):
-            found = watch_qmt(name, segment, gyro=gyro)
-            shares = [share_of(found, *window) for window in WINDOWS.values()]
-            times = [(t.kind, t.time_s) for t in found.transitions]
+            result = watch_qmt(name, segment, gyro=gyro)
+            shares = [share_of(result, *window) for window in WINDOWS.values()]
+            times = [(t.kind, t.time_s) for t in result.transitions]
             if name == "upper_back":
                 assert min(shares) >= 0.98
                 (down, seated), (up, rising) = times
                 assert (down, up) == ("stand_to_sit", "sit_to_stand")
                 assert SEATED_S[0] <= seated <= SEATED_S[1]
                 assert RISING_S[0] <= rising <= RISING_S[1]
-            told = ", ".join(f"{kind} {t:.1f}" for kind, t in times)
-            rows.append((name, "yes" if gyro else "no", *(f"{100 * x:.1f}" for x in shares), told))
+            text = ", ".join(f"{kind} {t:.1f}" for kind, t in times)
+            rows.append((name, "yes" if gyro else "no", *(f"{100 * x:.1f}" for x in shares), text))
     record(
         "Postures of qmt_fullbody",
         ("sensor", "gyroscope", *(f"{k} %" for k in WINDOWS), "transitions, s of the file"),
@@ -203,27 +207,29 @@ def test_a_person_sits_down_and_stands_up() -> None:
 def test_bouts_and_turns_of_a_lower_back() -> None:
     trial = mobgap.TRIALS[2]
     (stream,) = mobgap.recording(trial).streams.values()
-    found = monitor_activity(as_long_stream(stream), "pelvis", 1.6)
+    activity = monitor_activity(as_long_stream(stream), "pelvis", 1.6)
     periods = mobgap.periods(trial)
     times = [float(t) for p in periods for t in p.contacts]
-    inside = [float(t) for t in found.steps_s if any(p.start_s - 0.5 <= t <= p.end_s + 0.5 for p in periods)]
+    inside = [
+        float(t) for t in activity.steps_s if any(p.start_s - 0.5 <= t <= p.end_s + 0.5 for p in periods)
+    ]
     score = match(inside, times, 0.25)
     hits = len(score.errors)
     f1 = 2 * hits / (2 * hits + score.missed + len(score.extra))
     met = sum(
         any(
             min(b.end_s, p.end_s) - max(b.start_s, p.start_s) > 0.5 * (p.end_s - p.start_s)
-            for b in found.bouts
+            for b in activity.bouts
         )
         for p in periods
     )
     turns = mobgap.turns(trial)
-    same = sum(any(min(t.end_s, b) > max(t.start_s, a) for t in found.turns) for a, b in turns)
+    same = sum(any(min(t.end_s, b) > max(t.start_s, a) for t in activity.turns) for a, b in turns)
     assert met >= len(periods) - 1
     assert f1 >= 0.9
-    assert all(t.consistent for t in found.transitions)
-    assert [t.kind for t in found.transitions] == ["sit_to_stand", "stand_to_sit"] * 2
-    assert all(a.end_s == b.start_s for a, b in pairwise(found.spans))
+    assert all(t.consistent for t in activity.transitions)
+    assert [t.kind for t in activity.transitions] == ["sit_to_stand", "stand_to_sit"] * 2
+    assert all(a.end_s == b.start_s for a, b in pairwise(activity.spans))
     record(
         "Daily life of mobgap_lowback",
         ("walking periods", "found", "steps F1", "turns of the reference", "met"),

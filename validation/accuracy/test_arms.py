@@ -1,6 +1,6 @@
-"""What places and centres from motion gain: on simulated skin against the truth, on real people beside it.
+"""Gain from estimated sensor positions and joint centres: simulated skin against truth, and real people.
 
-`test_arms.py` of the unit tests holds the arms themselves; here it is what the ErKF makes of them.
+Unit tests (`test_arms.py`) cover the arms; here their effect on the ErKF is measured.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ def while_walking(mounted: MountedSensors, n: int) -> Bools:
 def score_people(mounted: MountedSensors, run: ErkfRun, truth: WalkTruth) -> tuple[list[float], float]:
     """RMS error in degrees of every angle while walking, both sides, and the bias of stride lengths in cm."""
     orientations = replace_orientations(run, mounted.orientations)
-    found = measure_angles(orientations, mounted.calibrated.calibration.zero).angles
+    angles = measure_angles(orientations, mounted.calibrated.calibration.zero).angles
     true, n = truth.subtract_standing(), min(len(run.track.q), len(truth.t_s))
     walked = while_walking(mounted, n)
     errors = []
     for name in ANGLES:
-        off = [wrap_angle(found[f"{name}_{s}"][:n] - true[f"{name}_{s}"][:n])[walked] for s in "rl"]
+        off = [wrap_angle(angles[f"{name}_{s}"][:n] - true[f"{name}_{s}"][:n])[walked] for s in "rl"]
         errors.append(float(np.degrees(np.sqrt(np.nanmean(np.square(off))))))
     feet, strides = foot_tracks(run, orientations, mounted.body), []
     for stride in truth.strides:
@@ -72,14 +72,14 @@ def _way(p: Floats, a: int, b: int) -> float:
 @cache
 def simulated_scores() -> dict[str, tuple[tuple[list[float], float], ...]]:
     """Person → scores with nominal arms and with measured ones."""
-    found = {}
+    result = {}
     for name, seed in PEOPLE:
         mounted, truth = analysed(name, seed).mounted, simulate_scenario(name, seed).truth
         assert mounted is not None
         assert mounted.arms is not None
         runs = (filter_take(mounted, arms) for arms in (None, mounted.arms))
-        found[name] = tuple(score_people(mounted, run, truth) for run in runs)
-    return found
+        result[name] = tuple(score_people(mounted, run, truth) for run in runs)
+    return result
 
 
 @cache
@@ -94,10 +94,10 @@ def test_write_down_what_arms_from_motion_gain() -> None:
     for name, (usual, ours) in simulated_scores().items():
         cells = [f"{a:.2f} → {b:.2f}" for a, b in zip(usual[0], ours[0], strict=True)]
         rows.append([name, *cells, f"{usual[1]:+.1f} → {ours[1]:+.1f}"])
-    both = [scores(x.angles_deg)[1] for x in real_chains()]
+    pair_of = [scores(x.angles_deg)[1] for x in real_chains()]
     cells = []
     for name in ANGLES:
-        pair = ["/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in both]
+        pair = ["/".join(f"{x[f'{name}_{s}'].offset_removed:.1f}" for s in "rl") for x in pair_of]
         cells.append(" → ".join(pair))
     ways = ["/".join(f"{x.strides_cm()[s].mean():+.1f}" for s in reversed(SIDES)) for x in real_chains()]
     rows.append(["neura_walk, right/left", *cells, " → ".join(ways)])
@@ -118,7 +118,7 @@ def test_write_down_what_arms_from_motion_gain() -> None:
     bias = [float(np.sqrt(np.mean([x[k][1] ** 2 for x in simulated_scores().values()]))) for k in (0, 1)]
     assert bias[1] < 0.7 * bias[0]
     for key in (f"{name}_{s}" for name in ANGLES for s in "rl"):
-        assert both[1][key].offset_removed < both[0][key].offset_removed + 0.15, key
+        assert pair_of[1][key].offset_removed < pair_of[0][key].offset_removed + 0.15, key
 
 
 def ends_apart_mm(mounted: MountedSensors, arms: MeasuredArms | None) -> float:

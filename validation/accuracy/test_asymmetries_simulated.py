@@ -1,7 +1,7 @@
-"""Left minus right of the virtual people, by the whole chain and by the same definitions on their truth.
+"""Left minus right of virtual people, from the whole chain and from ground truth.
 
-A parameter's error is shared by both sides where the sides walk alike; what a comparison of the sides sees is
-the part that is not. Sensors on skin with shocks and MEMS errors.
+Errors common to both sides cancel in comparisons; the remainder is measured. Sensors on skin with impacts and
+MEMS errors.
 """
 
 from __future__ import annotations
@@ -45,32 +45,32 @@ SHOWN: Final = (
 )  # fmt: skip
 
 
-def differences(of: MeasuredGait) -> dict[str, float]:
-    return {s.name: s.difference for s in compare_sides(of.parameters)}
+def differences(source: MeasuredGait) -> dict[str, float]:
+    return {s.name: s.difference for s in compare_sides(source.parameters)}
 
 
 @pytest.fixture(scope="module")
 def walks() -> dict[str, tuple[dict[str, float], dict[str, float]]]:
     """Person → true and found left − right by parameter."""
     pairs = {name: measured_walk(name)[1:] for name in PEOPLE}
-    return {name: (differences(true), differences(found)) for name, (true, found) in pairs.items()}
+    return {name: (differences(true), differences(result)) for name, (true, result) in pairs.items()}
 
 
 @pytest.mark.parametrize("name", PEOPLE)
 def test_sides_differ_as_they_really_do(
     walks: dict[str, tuple[dict[str, float], dict[str, float]]], name: str
 ) -> None:
-    true, found = walks[name]
-    for what, limit in LIMITS.items():
-        assert found[what] == pytest.approx(true[what], abs=limit), what
-        if abs(true[what]) > limit:
-            assert found[what] * true[what] > 0.0, what
+    true, result = walks[name]
+    for label, limit in LIMITS.items():
+        assert result[label] == pytest.approx(true[label], abs=limit), label
+        if abs(true[label]) > limit:
+            assert result[label] * true[label] > 0.0, label
 
 
 def test_write_the_table(walks: dict[str, tuple[dict[str, float], dict[str, float]]]) -> None:
     rows = []
-    for name, (true, found) in walks.items():
-        cells = (f"{found[what]:+.3g} ({true[what]:+.3g})" for what in SHOWN)
+    for name, (true, result) in walks.items():
+        cells = (f"{result[label]:+.3g} ({true[label]:+.3g})" for label in SHOWN)
         rows.append([name, *cells])
     record(
         "Sides of virtual people compared",

@@ -1,8 +1,7 @@
-"""The score of a calibration: no redo on clean recordings, and what a wrong forward axis of known size shows.
+"""Calibration score: no redo on clean recordings, and detection of anterior-axis errors of known size.
 
-Limits were set on simulated people (`knee_axis`, `stillness`) and, where flesh and asymmetry are larger than
-in simulation, above what neura_walk and qmt_fullbody show (`mirror`, `heading_spread`); gaitmap_foot and
-ipol_walks had no part in it.
+Limits come from simulated people (`knee_axis`, `stillness`) and, where soft tissue and asymmetry are larger,
+from neura_walk and qmt_fullbody (`mirror`, `heading_spread`); gaitmap_foot and ipol_walks were not used.
 """
 
 from __future__ import annotations
@@ -78,7 +77,7 @@ def test_clean_recordings_need_no_redo() -> None:
 
 @cache
 def person(name: str) -> tuple[CalibratedRecording, dict[str, float]]:
-    """A virtual person calibrated, and how far the forward axes beside each knee truly differ, degrees."""
+    """Calibrated virtual person, and the true difference of the axes at each knee, degrees."""
     recording, truth = simulated(name, 5)
     calibrated = calibrate(recording)
     turned = {}
@@ -98,7 +97,7 @@ def turn_axis(calibrated: CalibratedRecording, segment: Segment, degrees: float)
 
 def test_the_knee_measures_a_wrong_forward_axis() -> None:
     errors: list[float] = []
-    found: defaultdict[int, list[bool]] = defaultdict(list)
+    result: defaultdict[int, list[bool]] = defaultdict(list)
     for name in PEOPLE:
         calibrated, apart = person(name)
         for side in SIDES:
@@ -108,18 +107,18 @@ def test_the_knee_measures_a_wrong_forward_axis() -> None:
                 assert check.value is not None
                 true = abs(apart[side] - degrees)
                 errors.append(check.value - true)
-                found[min(30, 10 * int(true // 10))].append(check.verdict == "redo")
+                result[min(30, 10 * int(true // 10))].append(check.verdict == "redo")
     rms = float(np.sqrt(np.mean(np.square(errors))))
     assert rms < 2.0
-    assert np.mean(found[20] + found[30]) == 1.0
-    assert np.mean(found[0]) < 0.15
+    assert np.mean(result[20] + result[30]) == 1.0
+    assert np.mean(result[0]) < 0.15
     rows = [
         [
             f"{a} to {a + 10}°" if a < 30 else "30° and more",
-            str(len(found[a])),
-            f"{100 * np.mean(found[a]):.0f}",
+            str(len(result[a])),
+            f"{100 * np.mean(result[a]):.0f}",
         ]
-        for a in sorted(found)
+        for a in sorted(result)
     ]
     note = (
         f"{len(PEOPLE)} virtual people, the forward axis of one shank turned by −30 to 30°. The value of "
@@ -133,9 +132,11 @@ def test_swings_and_bows_recover_random_mountings() -> None:
     for title, setup in (("rigid", RecordingSetup()), ("on skin", ON_SKIN)):
         errors: defaultdict[str, list[float]] = defaultdict(list)
         for seed in range(8):
-            made = simulate_swings_and_bows(SwingsAndBows(swings=10, bows=5), seed=seed, setup=setup)
-            for s, x in calibrate(synchronise(made.recording)).calibration.segments.items():
-                off = x.R_segment_sensor @ to_matrix(made.truth.mounts[s].q_segment_sensor).T
+            swings_and_bows = simulate_swings_and_bows(
+                SwingsAndBows(swings=10, bows=5), seed=seed, setup=setup
+            )
+            for s, x in calibrate(synchronise(swings_and_bows.recording)).calibration.segments.items():
+                off = x.R_segment_sensor @ to_matrix(swings_and_bows.truth.mounts[s].q_segment_sensor).T
                 angle = float(np.degrees(np.arccos(np.clip(0.5 * (np.trace(off) - 1.0), -1.0, 1.0))))
                 errors[s.partition("_")[0]].append(angle)
         assert all(max(x) < 2.0 for x in errors.values())

@@ -1,7 +1,7 @@
-"""Distances of feet that never rest: the ways of ipol_walks, and gaitmap_foot as if nobody ever stood still.
+"""Distances of feet without still periods: ipol_walks, and gaitmap_foot without zero velocities.
 
-A lane of 10 m was walked there and back. Where exactly people turned nobody wrote down: what is held against
-each other is the way there and the way back of one foot, and how near to its start it ends.
+A lane of 10 m was walked in both directions. Turning points are unknown, so both directions of one foot are
+compared, and its distance to the start at the end.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def ways(walk: str, side: Side) -> tuple[float, float, float]:
     off, p = first_s(ipol_recording(walk, *FEET)), feet.p[side][:, :2]
     times = (events.walk_s[0] - BEFORE_S, float(np.mean(events.turn_s)), events.walk_s[1] + AFTER_S)
     first, turn, last = (p[int(np.clip((t - off) * RATE, 0, len(p) - 1))] for t in times)
-    there, back, apart = turn - first, last - turn, last - first
-    return tuple(float(np.linalg.norm(x)) for x in (there, back, apart))  # type: ignore[return-value]
+    target, back, apart = turn - first, last - turn, last - first
+    return tuple(float(np.linalg.norm(x)) for x in (target, back, apart))  # type: ignore[return-value]
 
 
 @cache
@@ -66,8 +66,8 @@ def never_still(side: Side) -> Floats:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(erkf_filter, "contact_samples", quietest)
-        made = run_erkf(*take(), BODY, (FOOT[side],), ErkfParams.offline())
-    return errors(made.track.p[:, 0], side, GAITMAP_RATE).straight
+        erkf = run_erkf(*take(), BODY, (FOOT[side],), ErkfParams.offline())
+    return errors(erkf.track.p[:, 0], side, GAITMAP_RATE).straight
 
 
 @cache
@@ -79,14 +79,18 @@ def thinned() -> tuple[TakeAnalysis, dict[Side, set[int]]]:
         side: Side = "left" if segment == "foot_l" else "right"
         stream, strides = whole.streams[device], true_strides(side)
         hit[side] = set(range(1, len(strides), 3))
-        kept = np.ones(len(stream.t_s), np.bool_)
+        stored_mask = np.ones(len(stream.t_s), np.bool_)
         for j in hit[side]:
             s, into = strides[j], rng.uniform(0.7, 0.9)
             first = round((s.first_ic_s + into * (s.last_ic_s - s.first_ic_s)) * RATE)
-            kept[first : first + HOLE] = False
+            stored_mask[first : first + HOLE] = False
         assert stream.gyr is not None
         streams[device] = replace(
-            stream, t_s=stream.t_s[kept], acc=stream.acc[kept], gyr=stream.gyr[kept], digest=device
+            stream,
+            t_s=stream.t_s[stored_mask],
+            acc=stream.acc[stored_mask],
+            gyr=stream.gyr[stored_mask],
+            digest=device,
         )
     return analyse(replace(whole, streams=streams)), hit
 
@@ -105,14 +109,14 @@ def test_a_stride_with_lost_packets_in_its_swing_has_no_distance_and_the_others_
                 withheld += 1
     assert withheld >= 12
     for side in SIDES:
-        found = []
+        result = []
         p = analysis.feet.p[side]
         for j, true in enumerate(true_strides(side)):
             if j not in hit[side] and not true.turning:
                 a, b = (min(round(t * RATE), len(p) - 1) for t in (true.start_s, true.end_s))
-                found.append(1000 * (float(np.linalg.norm((p[b] - p[a])[:2])) - true.length_m))
-        assert abs(np.mean(found)) <= 12.0
-        assert np.std(found) <= 30.0
+                result.append(1000 * (float(np.linalg.norm((p[b] - p[a])[:2])) - true.length_m))
+        assert abs(np.mean(result)) <= 12.0
+        assert np.std(result) <= 30.0
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -134,25 +138,25 @@ def test_nobody_is_told_to_wear_the_feet_exchanged() -> None:
 
 
 def test_the_way_back_is_as_long_as_the_way_there() -> None:
-    found = np.array([ways(w, side) for w in WALKS if w not in LOST for side in SIDES])
-    assert abs(np.mean(found[:, 1] - found[:, 0])) <= 0.2
-    assert np.std(found[:, 1] - found[:, 0]) <= 0.4
-    assert np.median(found[:, 2]) <= 0.6
+    values = np.array([ways(w, side) for w in WALKS if w not in LOST for side in SIDES])
+    assert abs(np.mean(values[:, 1] - values[:, 0])) <= 0.2
+    assert np.std(values[:, 1] - values[:, 0]) <= 0.4
+    assert np.median(values[:, 2]) <= 0.6
 
 
 def test_the_figures_are_in_the_document() -> None:
     rows = []
     for person in ("11", "12", "13", "14"):
         walks = [w for w in WALKS if w.startswith(person) and w not in LOST]
-        found = np.array([ways(w, side) for w in walks for side in SIDES])
-        off = found[:, 1] - found[:, 0]
+        values = np.array([ways(w, side) for w in walks for side in SIDES])
+        off = values[:, 1] - values[:, 0]
         rows.append([
             person,
             str(len(walks)),
             str(min(counted(w) for w in walks)),
-            *(f"{found[:, i].mean():.2f} ± {found[:, i].std(ddof=1):.2f}" for i in range(2)),
+            *(f"{values[:, i].mean():.2f} ± {values[:, i].std(ddof=1):.2f}" for i in range(2)),
             f"{off.mean():+.2f} ± {off.std(ddof=1):.2f}",
-            f"{np.median(found[:, 2]):.2f}",
+            f"{np.median(values[:, 2]):.2f}",
         ])  # fmt: skip
     moments = ", ".join(
         f"{side} {never_still(side).mean():+.1f} ± {never_still(side).std():.1f}" for side in SIDES

@@ -67,9 +67,9 @@ def figures() -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
 
 
 def errors_cm(name: str) -> np.ndarray:
-    ours, vicon = (of[name] for of in figures())
-    found = 100 * (ours - vicon)
-    return np.asarray(found[np.isfinite(found)])
+    ours, vicon = (source[name] for source in figures())
+    result = 100 * (ours - vicon)
+    return np.asarray(result[np.isfinite(result)])
 
 
 def total_m(feet: FootTracks) -> float:
@@ -94,7 +94,7 @@ def test_the_way_walked_agrees_within_two_percent() -> None:
 
 
 def test_write_down_the_figures() -> None:
-    found = []
+    result = []
     for name, limit in LIMIT_CM.items():
         e = errors_cm(name)
         cells = [
@@ -102,12 +102,12 @@ def test_write_down_the_figures() -> None:
             f"{e.mean():+.1f} ± {e.std():.1f}",
             f"{np.abs(e).max():.1f}",
         ]
-        found.append([name.removesuffix("_m").replace("_", " "), str(len(e)), *cells, f"{limit:g}"])
+        result.append([name.removesuffix("_m").replace("_", " "), str(len(e)), *cells, f"{limit:g}"])
     ours, vicon = (total_m(feet) for feet in tracks())
     record(
         "Distances on neura_walk",
         ["figure", "strides", "Vicon, mean cm", "error mean ± SD cm", "largest cm", "limit of the mean cm"],
-        found,
+        result,
         "Whole strides ahead, a last short one into standing among them that the report does not count, "
         "against the same definitions on Vicon's ankles; ankles "
         f"{100 * standing_width_m():.0f} cm apart while standing are entered, without this there is no "

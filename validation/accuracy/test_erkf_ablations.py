@@ -1,8 +1,7 @@
-"""Which correction of the ErKF holds what, and how good its parameter sets are, on walks with exact truth.
+"""Contribution of each ErKF correction, and accuracy of its parameter sets, on walks with exact truth.
 
-Mounts, places and body are known here, so that what is left is the filter's own. Sensors have MEMS errors;
-headings are found from a standing start that takes all segments to face ahead. Every run has some of the
-rows; all are run with `--write-figures`.
+Alignment, positions and body are known, leaving the filter's own error. Sensors have MEMS errors; headings
+start from standing with all segments facing ahead. Each run covers some rows; `--write-figures` runs all.
 """
 
 from __future__ import annotations
@@ -81,8 +80,8 @@ def run(
     tree = tree or take.tree
     first = start_state(tree, take.inputs, params, take.rest)
     if turn_deg:
-        by = [about(2, radians(turn_deg if i % 2 else -turn_deg)) for i in range(len(SEGMENTS))]
-        q = multiply(np.array(by), first.nominal[:, 6:10])
+        by_key = [about(2, radians(turn_deg if i % 2 else -turn_deg)) for i in range(len(SEGMENTS))]
+        q = multiply(np.array(by_key), first.nominal[:, 6:10])
         first = start_state(tree, take.inputs, params, take.rest, q=q)
     track, _ = (smooth if smoothed else filter_block)(first, take.inputs, tree, params)
     return score(replace(take, tree=tree), track)
@@ -198,12 +197,12 @@ SETS: dict[str, Callable[[], Score]] = {
 def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> None:
     """docs/science/erkf.md, "Limits on simulated walks". The filter alone may have 0.3° of rotation more: the
     impact rule lets less be learned of heading, which the smoother makes up for."""
-    found = {name: make() for name, make in SETS.items() if WHOLE or "seeds" in name}
+    by_name = {name: make() for name, make in SETS.items() if WHOLE or "seeds" in name}
     record(
         "ErKF on simulated walks: parameter sets",
         ["run", *HEADER],
         [
-            *([name, *s.row()] for name, s in found.items()),
+            *([name, *s.row()] for name, s in by_name.items()),
             ["prototype, another walker, filter, 310 s", *SPEC[0].split(", "), ""],
             ["the same smoothed", *SPEC[1].split(", "), ""],
         ],
@@ -212,7 +211,7 @@ def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> Non
         "prototype's figures are of another walker, of true first positions, and without the impact rule.",
         whole=WHOLE,
     )
-    for name, s in found.items():
+    for name, s in by_name.items():
         if name.startswith("live"):
             assert s.stride < 6.0, name
             assert s.hip[2] < (2.5 if "seeds" in name else 3.0), name
@@ -228,19 +227,20 @@ def test_live_offline_and_smoothed_keep_the_limits_of_the_specification() -> Non
         assert s.stride < 6.0, name
         assert s.width < 9.0, name
     for walks in ("seeds 2, 3, 4", "4 min") if WHOLE else ("seeds 2, 3, 4",):
-        alone, both = (found[f"offline, {x}, {walks}"] for x in ("filter", "smoothed"))
-        assert both.stride < alone.stride
-        assert both.ankle[2] < alone.ankle[2]
+        single, pair = (by_name[f"offline, {x}, {walks}"] for x in ("filter", "smoothed"))
+        assert pair.stride < single.stride
+        assert pair.ankle[2] < single.ankle[2]
     if WHOLE:
-        assert both.heading < 0.8 * alone.heading
+        assert pair.heading < 0.8 * single.heading
 
 
 def test_calibration_is_the_accuracy_budget_not_the_filter() -> None:
-    """2° of mounting and 1 cm of joint centre cost ten times what the filter leaves. The hinge
-    axis hurts where the knee is none."""
+    """2° of misalignment and 1 cm of joint-centre error cost ten times the filter's error. The hinge axis
+    harms where the knee is not a hinge.
+    """
     take, skin = minute(2), on_skin()
     wrong = misaligned(skin.tree)
-    found = {
+    result = {
         "known mounts, on bone": run(take, OFFLINE, smoothed=True),
         "on skin, knee turns by 8°": run(skin, OFFLINE, smoothed=True),
         "the same, σ_JA 0.05 rad": run(skin, replace(OFFLINE, joint_axis_sd=0.05), smoothed=True),
@@ -249,11 +249,11 @@ def test_calibration_is_the_accuracy_budget_not_the_filter() -> None:
     record(
         "ErKF on simulated walks: sensors on skin",
         ["run", *HEADER],
-        [[name, *s.row()] for name, s in found.items()],
+        [[name, *s.row()] for name, s in result.items()],
         "Offline set, smoothed; 80 s. Soft tissue 3° and 10 mm. The hinge's axis as a measurement is off in "
         "the shipped sets, because knees turn. Joint centres 30 mm where they are wrong (`people`).",
     )
-    bone, tissue, hinged, wrongly = found.values()
+    bone, tissue, hinged, wrongly = result.values()
     assert tissue.hip[0] < 1.5
     assert tissue.knee[0] < 1.0
     assert hinged.hip[2] > 2.0 * tissue.hip[2]

@@ -57,13 +57,13 @@ def lone_strides_cm(side: Side) -> Floats:
 
 
 def test_the_erkf_with_smoother_is_within_the_limits() -> None:
-    made = healthy()
-    lag, found = scores(made.angles_deg)
-    strides = made.strides_cm()
-    residual = made.residual_mm()
+    output = healthy()
+    lag, result = scores(output.angles_deg)
+    strides = output.strides_cm()
+    residual = output.residual_mm()
     rows = []
     for name in (*OFFSET_REMOVED, *NO_LIMIT):
-        pair = [found[f"{name}_{end}"] for end in "rl"]
+        pair = [result[f"{name}_{end}"] for end in "rl"]
         cells = [name.replace("_", " "), "/".join(f"{x.offset_removed:.1f}" for x in pair)]
         cells.append(_limits(OFFSET_REMOVED, name, ".1f"))
         cells += ["/".join(f"{x.zeroed:.1f}" for x in pair), _limits(ZEROED, name, ".1f")]
@@ -77,10 +77,10 @@ def test_the_erkf_with_smoother_is_within_the_limits() -> None:
         "out and back. Rotations of knee and ankle rest on single markers: low confidence, no limit. "
         f"Straight strides against Vicon: {_told(strides)}; limit 2.5 ± 1.5 cm. From each foot's sensor "
         f"alone: {_told({s: lone_strides_cm(s) for s in SIDES})}; limit 2 ± 1 cm. Joint-centre residual "
-        f"{residual.min():.0f} to {residual.max():.0f} mm, {int(made.run.track.refused.sum())} zero "
+        f"{residual.min():.0f} to {residual.max():.0f} mm, {int(output.run.track.refused.sum())} zero "
         "velocities refused. The noise figures were found on this recording (docs/science/erkf.md).",
     )
-    means = [np.mean([found[f"{name}_{end}"].offset_removed for end in "rl"]) for name in FLEXION]
+    means = [np.mean([result[f"{name}_{end}"].offset_removed for end in "rl"]) for name in FLEXION]
     record_in_short(
         "Flexion of hip / knee / ankle, seven sensors: RMSE °",
         "below 5 is called acceptable (McGinley 2009)",
@@ -90,10 +90,10 @@ def test_the_erkf_with_smoother_is_within_the_limits() -> None:
     for limits, value in ((OFFSET_REMOVED, "offset_removed"), (ZEROED, "zeroed")):
         for name, pair_of_limits in limits.items():
             for end, limit in zip("rl", pair_of_limits, strict=True):
-                assert limit is None or getattr(found[f"{name}_{end}"], value) <= limit, f"{name} {end}"
+                assert limit is None or getattr(result[f"{name}_{end}"], value) <= limit, f"{name} {end}"
     for name, least in CORRELATION.items():
         for end, r in zip("rl", least, strict=True):
-            assert r is None or found[f"{name}_{end}"].r >= r, f"{name} {end}"
+            assert r is None or result[f"{name}_{end}"].r >= r, f"{name} {end}"
     for errors in strides.values():
         assert len(errors) == 5
         assert abs(errors.mean()) <= 2.5
@@ -109,16 +109,16 @@ def test_strides_of_a_foot_alone_are_within_the_limits() -> None:
 
 
 def test_the_pipeline_gives_these_angles_and_feet() -> None:
-    made, analysis = healthy(), neura_analysis()
+    result, analysis = healthy(), neura_analysis()
     assert analysis.problem is None
     assert analysis.poses is not None
     assert analysis.orientations is not None
     assert analysis.feet is not None
     assert (analysis.poses.method, analysis.poses.reduced) == ("erkf_smoothed", None)
-    for segment, q in made.orientations.q.items():
+    for segment, q in result.orientations.q.items():
         np.testing.assert_allclose(analysis.orientations.q[segment], q, atol=1e-12)
     for side in SIDES:
-        np.testing.assert_allclose(analysis.feet.p[side], made.ankle(side), atol=1e-9)
+        np.testing.assert_allclose(analysis.feet.p[side], result.ankle(side), atol=1e-9)
 
 
 def _limits(table: Mapping[str, tuple[float, float | None]], name: str, form: str) -> str:
@@ -138,20 +138,22 @@ def test_l7s_from_three_and_two_sensors_is_within_the_limits() -> None:
         steps[side] = still_samples(signals.acc, gyr, signals.valid, 100.0, FOOT_STILL)
     acceleration = free_acceleration(calibrated, orientations)
     rows: list[list[str]] = []
-    kept: dict[str, list[tuple[float, float]]] = {}
-    worn: Worn
-    for worn in ("3I", "2I"):
-        poses = l7s_poses(orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), worn=worn)
-        _, found = scores(raw_degrees(dict(poses.q)))
+    retained: dict[str, list[tuple[float, float]]] = {}
+    segments: Worn
+    for segments in ("3I", "2I"):
+        poses = l7s_poses(
+            orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), configuration=segments
+        )
+        _, result = scores(raw_degrees(dict(poses.q)))
         figures = [
             (
-                float(np.mean([found[f"{n}_{e}"].offset_removed for e in "rl"])),
-                float(np.mean([found[f"{n}_{e}"].r for e in "rl"])),
+                float(np.mean([result[f"{n}_{e}"].offset_removed for e in "rl"])),
+                float(np.mean([result[f"{n}_{e}"].r for e in "rl"])),
             )
             for n in FLEXION
         ]
-        kept[worn] = figures
-        rows.append([f"L7S-{worn}", *(f"{rmse:.1f} / {r:.2f}" for rmse, r in figures)])
+        retained[segments] = figures
+        rows.append([f"L7S-{segments}", *(f"{rmse:.1f} / {r:.2f}" for rmse, r in figures)])
     rows.append(["Sy 2021 Table V, 3I", "5.0 / .95", "8.2 / .91", "5.9 / .78"])
     rows.append(["Sy 2021 Table V, 2I", "6.9 / .90", "9.5 / .89", "7.5 / .77"])
     record(
@@ -162,14 +164,14 @@ def test_l7s_from_three_and_two_sensors_is_within_the_limits() -> None:
         "people, per step of straight walking. Both ways (the file); live has the filter's figures of the "
         'table "L7S: both ways".',
     )
-    for worn, number, paper in (("3I", "three", "5.0 / 8.2 / 5.9"), ("2I", "two", "6.9 / 9.5 / 7.5")):
+    for segments, number, paper in (("3I", "three", "5.0 / 8.2 / 5.9"), ("2I", "two", "6.9 / 9.5 / 7.5")):
         record_in_short(
             f"The same with {number} sensors (L7S)",
             f"{paper} (Sy 2021 Table V, 9 people)",
-            " / ".join(f"{rmse:.1f}" for rmse, _ in kept[worn]),
+            " / ".join(f"{rmse:.1f}" for rmse, _ in retained[segments]),
             "neura_walk, 1 person, whole walk with its turn",
         )
     for mode, (rmse_limits, r_limits) in L7S_LIMIT.items():
-        for (rmse, r), rmse_limit, r_limit in zip(kept[mode], rmse_limits, r_limits, strict=True):
+        for (rmse, r), rmse_limit, r_limit in zip(retained[mode], rmse_limits, r_limits, strict=True):
             assert rmse <= rmse_limit, mode
             assert r >= r_limit, mode

@@ -1,10 +1,9 @@
-"""Headings on neura_walk: the joints bring all sensors to one heading, whatever calibration took for forward.
+"""Headings on neura_walk: joints align all sensors, whatever the calibrated anterior axes.
 
-A sensor's start is turned about the vertical together with its forward axis, as a wrong walking direction
-would turn it. What then moves in the result is measured twice: where the sensors head relative to the
-pelvis', and how far the segments' forward axes come out from each other. Which way all of them together face
-no joint can tell (core/body/erkf/headings.py takes the median), so a turn they share is left out. Limits:
-docs/science/real-recordings.md, "Limits".
+Start orientation and anterior axis of a sensor are rotated together about the vertical, like a wrong walking
+direction. Measured are sensor headings relative to the pelvis, and the spread of the anterior axes. Their
+common direction is unobservable from joints (core/body/erkf/headings.py uses the median) and is removed.
+Limits: docs/science/real-recordings.md, "Limits".
 """
 
 from __future__ import annotations
@@ -47,12 +46,12 @@ def heading_change_deg(q: Floats, base: Floats) -> Floats:
     return np.asarray(np.degrees(np.angle(np.mean(np.exp(2j * np.arctan2(d[..., 3], d[..., 0])), axis=0))))
 
 
-def moved(made: Chain) -> tuple[float, float]:
+def moved(result: Chain) -> tuple[float, float]:
     """Largest change in degrees of a sensor's heading against the pelvis', and of a forward axis."""
     base = healthy()
-    sensors = heading_change_deg(made.run.track.q, base.run.track.q)
+    sensors = heading_change_deg(result.run.track.q, base.run.track.q)
     axes = heading_change_deg(
-        made.run.tree.segment_q(made.run.track.q), base.run.tree.segment_q(base.run.track.q)
+        result.run.tree.segment_q(result.run.track.q), base.run.tree.segment_q(base.run.track.q)
     )
     return (
         float(np.abs(_wrapped(sensors - sensors[0])).max()),
@@ -93,10 +92,10 @@ def test_independent_filters_keep_the_heading_they_were_given() -> None:
 def test_write_down_the_figures() -> None:
     rows = []
     for size in (30.0, 60.0, 120.0):
-        alone = [moved(perturbed(((s, sign * size),))) for s in SEGMENTS for sign in (1, -1)]
+        single = [moved(perturbed(((s, sign * size),))) for s in SEGMENTS for sign in (1, -1)]
         together = moved(perturbed(tuple((s, size * sign) for s, sign in ALTERNATING.items())))
         for name, (sensors, axes) in (
-            (f"one sensor by ±{size:.0f}°, worst of 14", tuple(np.max(alone, axis=0))),
+            (f"one sensor by ±{size:.0f}°, worst of 14", tuple(np.max(single, axis=0))),
             (f"all alternately by ±{size:.0f}°", together),
         ):
             rows.append([name, f"{sensors:.1f}", f"{axes:.1f}"])
@@ -104,7 +103,7 @@ def test_write_down_the_figures() -> None:
         "calibration (velocity)": heading_against_vicon_deg(sensor_q(*take())),
         "ErKF": heading_against_vicon_deg(healthy().run.track.q),
     }
-    told = "; ".join(
+    text = "; ".join(
         f"{name}: right {', '.join(f'{x:+.1f}' for x in off[RIGHT_LEG])}, "
         f"left {', '.join(f'{x:+.1f}' for x in off[LEFT_LEG])}"
         for name, off in vicon.items()
@@ -118,6 +117,6 @@ def test_write_down_the_figures() -> None:
         "and for all; larger starts are reported only. Alternately turned starts turn all axes by what most "
         "had, which no joint can see and places tell. Against the acceleration of Vicon's markers, thigh, "
         "shank, foot relative to the pelvis, °: "
-        f"{told}; limit 3° on the right. On the left this reference and the joints contradict each other; "
+        f"{text}; limit 3° on the right. On the left this reference and the joints contradict each other; "
         "which is right is undecided.",
     )

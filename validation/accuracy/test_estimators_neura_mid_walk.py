@@ -37,15 +37,15 @@ def cut_at(start_s: float) -> Chain:
     return chain(calibrated, estimate_orientations(calibrated))
 
 
-def offset_removed(made: Chain, name: str, first: int) -> float:
+def offset_removed(result: Chain, name: str, first: int) -> float:
     """RMSE of one angle against Vicon without its mean, degrees."""
-    x = made.angles_deg[name][ROWS.start + LAG - first : ROWS.stop + LAG - first]
+    x = result.angles_deg[name][ROWS.start + LAG - first : ROWS.stop + LAG - first]
     return float(np.std(x - reference()[name][ROWS]))
 
 
-def strides_cm(made: Chain, side: Side, first: int) -> Floats:
-    """Errors of the straight strides that lie in the cut take."""
-    p = made.ankle(side)
+def strides_cm(result: Chain, side: Side, first: int) -> Floats:
+    """Errors of the straight strides within the cut trial."""
+    p = result.ankle(side)
     return np.array(
         [
             100 * (np.linalg.norm((p[b - first] - p[a - first])[:2]) - length)
@@ -55,40 +55,42 @@ def strides_cm(made: Chain, side: Side, first: int) -> Floats:
     )
 
 
-def apart_mm(made: Chain) -> float:
+def apart_mm(result: Chain) -> float:
     """RMS distance of the two ends of the worst joint."""
-    return float(1000 * np.sqrt(np.mean(made.run.track.joint_residual**2, axis=0)).max())
+    return float(1000 * np.sqrt(np.mean(result.run.track.joint_residual**2, axis=0)).max())
 
 
 @pytest.mark.parametrize("start_s", CUTS_S)
 def test_flexion_and_strides_hold_from_a_start_mid_walk(start_s: float) -> None:
-    made, first = cut_at(start_s), round(start_s * RATE)
-    assert made.run.rest is None, "the take does not begin at rest"
+    result, first = cut_at(start_s), round(start_s * RATE)
+    assert result.run.rest is None, "the take does not begin at rest"
     for name, limits in LIMIT.items():
         for end, limit in zip("rl", limits, strict=True):
-            assert offset_removed(made, f"{name}_{end}", first) <= limit, f"{name} {end}"
+            assert offset_removed(result, f"{name}_{end}", first) <= limit, f"{name} {end}"
     for side in SIDES:
-        e = strides_cm(made, side, first)
+        e = strides_cm(result, side, first)
         assert len(e) >= 3
         assert abs(e.mean()) <= 2.5
         assert e.std() <= 1.5
-    assert apart_mm(made) <= 30.0
+    assert apart_mm(result) <= 30.0
 
 
 def test_write_down_the_figures() -> None:
     names = [*LIMIT, "hip_adduction", "knee_adduction"]
     rows = []
-    for start_s, made in ((0.0, healthy()), *((s, cut_at(s)) for s in CUTS_S)):
+    for start_s, result in ((0.0, healthy()), *((s, cut_at(s)) for s in CUTS_S)):
         first = round(start_s * RATE)
-        cells = ["/".join(f"{offset_removed(made, f'{n}_{end}', first):.1f}" for end in "rl") for n in names]
+        cells = [
+            "/".join(f"{offset_removed(result, f'{n}_{end}', first):.1f}" for end in "rl") for n in names
+        ]
         for side in SIDES:
-            e = strides_cm(made, side, first)
+            e = strides_cm(result, side, first)
             cells.append(f"{e.mean():+.1f} ± {e.std():.1f} ({len(e)})")
         rows.append(
             [
                 f"{start_s:.1f} s" if start_s else "whole take",
                 *cells,
-                f"{apart_mm(made):.0f}",
+                f"{apart_mm(result):.0f}",
             ]
         )
     record(

@@ -1,10 +1,8 @@
-"""Wrong handling on neura_walk: what each mistake does to the figures, and which measured quantity shows it.
+"""Wrong handling on neura_walk: effect on angles, and measures that reveal it.
 
-The mistakes are made on the recording or on its calibration, then the product's chain runs as always. Vicon
-only tells how wrong the figures are; what catches a mistake is what the chain measures itself: how far the
-two ends of a joint lie apart, zero velocities that the gate refused, how far forward axes had to be turned.
-The last rows are no mistake of handling but of building: six filters that know nothing of each other. They
-pass for flexion, and nothing of the three exists for them; strides and headings give them away
+Mistakes are applied to the recording or its calibration before the product's chain. Vicon only scores the
+result; mistakes are revealed by joint residuals, refused zero velocities and corrections of anterior axes.
+The last rows are six independent filters, which pass for flexion but fail for strides and headings
 (docs/science/real-recordings.md, "Wrong handling", "Limits").
 """
 
@@ -76,18 +74,18 @@ class Result:
 
     @property
     def caught(self) -> tuple[str, ...]:
-        """Quantities beyond their limit, without any reference."""
-        found = {
+        """Measures beyond their limit, without any reference."""
+        result = {
             "residual": self.residual_rms > RESIDUAL_MM[0],
             "refused": self.refused > REFUSED_PCT[0],
             "heading": self.turned > TURNED_DEG,
         }
-        return tuple(name for name, beyond in found.items() if beyond)
+        return tuple(name for name, beyond in result.items() if beyond)
 
 
 def calibrated(recording: UniformRecording) -> Calibrated:
-    found = calibrate(recording)
-    return found, estimate_orientations(found)
+    result = calibrate(recording)
+    return result, estimate_orientations(result)
 
 
 def swapped(a: Segment, b: Segment) -> Calibrated:
@@ -98,14 +96,14 @@ def swapped(a: Segment, b: Segment) -> Calibrated:
 
 def legs_swapped() -> Calibrated:
     """All sensors of one leg on the other."""
-    other = {s: s[:-1] + {"l": "r", "r": "l"}[s[-1]] for s in SEGMENTS if s != "pelvis"}
+    second = {s: s[:-1] + {"l": "r", "r": "l"}[s[-1]] for s in SEGMENTS if s != "pelvis"}
     sensors = dict(neura_walk().sensors)
-    swap: dict[Segment, SensorSignals] = {s: sensors[cast("Segment", x)] for s, x in other.items()}
+    swap: dict[Segment, SensorSignals] = {s: sensors[cast("Segment", x)] for s, x in second.items()}
     return calibrated(replace(neura_walk(), sensors=sensors | swap))
 
 
 def late(segment: Segment, by_s: float) -> Calibrated:
-    """One sensor's clock behind the others'."""
+    """Delay of one sensor's clock."""
     x, shift = neura_walk().sensors[segment], round(by_s * RATE)
 
     def delayed(a: Floats) -> Floats:
@@ -122,18 +120,18 @@ def mounted(segment: Segment, by_deg: float) -> Calibrated:
 
 def pelvis_by_gyro() -> Calibrated:
     """The pelvis' forward axis from the principal axis of its angular rate, which walking does not give."""
-    found, orientations = take()
-    mount = found.calibration.segments["pelvis"]
+    trial, orientations = take()
+    mount = trial.calibration.segments["pelvis"]
     walking = np.zeros(len(orientations.t_s), bool)
-    for window in found.calibration.walking:
+    for window in trial.calibration.walking:
         walking[index_window(window, RATE)] = True
     vertical = vertical_frame(mount.R_segment_sensor[1])
-    rate = (found.recording.sensors["pelvis"].gyr[walking] - mount.gyro_bias) @ vertical.T
+    rate = (trial.recording.sensors["pelvis"].gyr[walking] - mount.gyro_bias) @ vertical.T
     x, z = np.linalg.svd(rate[:, [0, 2]] - rate[:, [0, 2]].mean(axis=0), full_matrices=False)[2][0]
     apart = about_vertical(np.arctan2(-x, z)) @ vertical @ mount.R_segment_sensor.T
     off = float(np.arctan2(apart[0, 2], apart[0, 0]))
     # an axis has no sign: the better one
-    return turn_forward_axes(found, orientations, {"pelvis": (off + pi / 2) % pi - pi / 2})
+    return turn_forward_axes(trial, orientations, {"pelvis": (off + pi / 2) % pi - pi / 2})
 
 
 CASES: dict[str, tuple[Callable[[], Calibrated], bool]] = {
@@ -161,23 +159,25 @@ LEFT_SO = ("right thigh reversed", "right foot reversed", "pelvis by gyro PCA", 
 @cache
 def result(name: str, agree: bool = True) -> Result:
     make, _ = CASES[name]
-    made = chain(*make(), agree=agree)
-    track, rate = made.run.track, made.calibrated.recording.rate_hz
+    output = chain(*make(), agree=agree)
+    track, rate = output.run.track, output.calibrated.recording.rate_hz
     # a run keeps no signals
-    inputs = erkf_inputs(made.run.tree, *correct_signals(made.calibrated, made.run.segments), rate)
-    inputs = replace(inputs, patched=made.run.inputs.patched)
-    start = start_state(made.run.tree, inputs, LIVE, made.run.rest, q=made.run.start.nominal[:, 6:10])
-    live, _ = filter_block(start, inputs, made.run.tree, LIVE)
-    _, found = scores(made.angles_deg)
+    inputs = erkf_inputs(output.run.tree, *correct_signals(output.calibrated, output.run.segments), rate)
+    inputs = replace(inputs, patched=output.run.inputs.patched)
+    start = start_state(output.run.tree, inputs, LIVE, output.run.rest, q=output.run.start.nominal[:, 6:10])
+    live, _ = filter_block(start, inputs, output.run.tree, LIVE)
+    _, results = scores(output.angles_deg)
     return Result(
         residual_max=float(1000 * track.joint_residual.max()),
-        residual_rms=float(made.residual_mm().max()),
+        residual_rms=float(output.residual_mm().max()),
         live_rms=float(1000 * np.sqrt(np.mean(live.joint_residual[WALK] ** 2, axis=0)).max()),
         refused=float(100 * track.refused.sum() / inputs.contact[WALK].sum()),
-        turned=degrees(max((abs((x + pi) % (2 * pi) - pi) for x in made.turned.values()), default=0.0)),
-        flexion_r=min(found[f"{n}_{end}"].r for n in ("hip_flexion", "knee_flexion") for end in "rl"),
-        adduction=max(found[f"{n}_adduction_{end}"].offset_removed for n in ("hip", "knee") for end in "rl"),
-        stride=max((float(e.mean()) for e in made.strides_cm().values()), key=abs),
+        turned=degrees(max((abs((x + pi) % (2 * pi) - pi) for x in output.turned.values()), default=0.0)),
+        flexion_r=min(results[f"{n}_{end}"].r for n in ("hip_flexion", "knee_flexion") for end in "rl"),
+        adduction=max(
+            results[f"{n}_adduction_{end}"].offset_removed for n in ("hip", "knee") for end in "rl"
+        ),
+        stride=max((float(e.mean()) for e in output.strides_cm().values()), key=abs),
     )
 
 
@@ -187,23 +187,23 @@ def test_every_mistake_is_caught_by_a_measured_quantity(name: str) -> None:
 
 
 def test_the_healthy_take_is_caught_by_none() -> None:
-    found = result("healthy")
-    assert found.caught == ()
-    assert found.residual_rms < 0.7 * RESIDUAL_MM[0]
+    results = result("healthy")
+    assert results.caught == ()
+    assert results.residual_rms < 0.7 * RESIDUAL_MM[0]
 
 
 @pytest.mark.parametrize("name", [n for n in CASES if "reversed" in n or "turned" in n or "PCA" in n])
 def test_a_wrong_forward_axis_is_not_only_caught_but_repaired(name: str) -> None:
-    made, healthy = result(name), result("healthy")
-    assert made.turned > TURNED_DEG
-    assert made.adduction == pytest.approx(healthy.adduction, abs=0.3)
-    assert made.flexion_r == pytest.approx(healthy.flexion_r, abs=0.003)
+    output, healthy = result(name), result("healthy")
+    assert output.turned > TURNED_DEG
+    assert output.adduction == pytest.approx(healthy.adduction, abs=0.3)
+    assert output.flexion_r == pytest.approx(healthy.flexion_r, abs=0.003)
 
 
-def lazy(by: dict[Segment, float]) -> tuple[list[str], float, float]:
+def lazy(key: dict[Segment, float]) -> tuple[list[str], float, float]:
     """Row, worst stride bias in cm and worst heading of the right leg of six-axis filters without joints."""
-    found, orientations = turn_forward_axes(*take(), by)
-    _, score = scores(angles_deg(orientations, found))
+    result, orientations = turn_forward_axes(*take(), key)
+    _, score = scores(angles_deg(orientations, result))
     contacts = events.detect(orientations)
     down = {
         s: contact_mask(orientations.t_s, contacts.times(s, "ic"), contacts.times(s, "tc")) for s in SIDES
@@ -211,7 +211,7 @@ def lazy(by: dict[Segment, float]) -> tuple[list[str], float, float]:
     poses = forward_kinematics(orientations, BODY, down)
     strides: dict[Side, Floats] = {s: 100 * stride_errors_m(s, poses.p[FOOT[s]]) for s in SIDES}
     bias = max((float(e.mean()) for e in strides.values()), key=abs)
-    heading = float(np.abs(heading_against_vicon_deg(sensor_q(found, orientations))[1:4]).max())
+    heading = float(np.abs(heading_against_vicon_deg(sensor_q(result, orientations))[1:4]).max())
     r = min(score[f"{n}_{end}"].r for n in ("hip_flexion", "knee_flexion") for end in "rl")
     adduction = max(score[f"{n}_adduction_{end}"].offset_removed for n in ("hip", "knee") for end in "rl")
     return [f"{r:.2f}", f"{adduction:.1f}", f"{bias:+.1f}"], bias, heading
@@ -232,14 +232,14 @@ def test_independent_filters_are_given_away_by_strides_and_headings() -> None:
 
 def test_write_down_the_figures() -> None:
     rows = []
-    shown = {name: result(name) for name in CASES}
-    shown |= {f"{name}, left so": result(name, agree=False) for name in LEFT_SO}
-    for name, x in shown.items():
+    visible_by_name = {name: result(name) for name in CASES}
+    visible_by_name |= {f"{name}, left so": result(name, agree=False) for name in LEFT_SO}
+    for name, x in visible_by_name.items():
         sizes = (x.residual_max, x.residual_rms, x.live_rms, x.refused, x.turned)
         vicon = [f"{x.flexion_r:.2f}", f"{x.adduction:.1f}", f"{x.stride:+.1f}"]
         rows.append([name, *(f"{size:.0f}" for size in sizes), *vicon, ", ".join(x.caught) or "–"])
-    for name, by in (("healthy", {}), ("right shank turned 30°", {"shank_r": radians(30.0)})):
-        cells, _, heading = lazy(by)  # type: ignore[arg-type]
+    for name, by_key in (("healthy", {}), ("right shank turned 30°", {"shank_r": radians(30.0)})):
+        cells, _, heading = lazy(by_key)  # type: ignore[arg-type]
         caught = f"strides, heading (right leg {heading:.0f}° off Vicon)"
         rows.append([f"six filters without joints, {name}", "", "", "", "", "", *cells, caught])
     record(

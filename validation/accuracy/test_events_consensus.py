@@ -42,12 +42,12 @@ def take(name: str) -> Orientations:
 
 @cache
 def found(name: str) -> dict[str, GaitEvents]:
-    """Every detector whose sensors are worn, and the consensus."""
-    here = take(name)
-    detectors = all_detectors(here)
-    presets = {n: gyro_peak_events(here, here.rate_hz, p) for n, p in PRESETS.items()}
-    worn = {n: e for n, e in presets.items() if "segment_missing" not in {x.code for x in e.notices}}
-    return {"foot_pitch": detectors["foot_pitch"], **worn, "consensus": agree_on_contacts(detectors)}
+    """All applicable detectors and their consensus."""
+    place = take(name)
+    detectors = all_detectors(place)
+    presets = {n: gyro_peak_events(place, place.rate_hz, p) for n, p in PRESETS.items()}
+    segments = {n: e for n, e in presets.items() if "segment_missing" not in {x.code for x in e.notices}}
+    return {"foot_pitch": detectors["foot_pitch"], **segments, "consensus": agree_on_contacts(detectors)}
 
 
 def scores(name: str, detector: str, kind: EventKind) -> list[Score]:

@@ -27,7 +27,7 @@ RATES = (204.8, 60.0, 100.0, 128.0)
 
 @cache
 def found(name: str, rate_hz: float) -> tuple[GaitEvents, Strides]:
-    """Events and strides by the product's chain; only the manifest tells it about the file."""
+    """Events and strides of the product's chain, with a manifest only."""
     recording = recording_of(resampled(name, rate_hz), rate_hz)
     calibrated = calibration.calibrate(timeline.synchronise(recording))
     orientations = estimate_orientations(calibrated)
@@ -107,11 +107,11 @@ def test_write_down_the_stride_times() -> None:
             e = 1e3 * stride_errors(COPIES[0], rate_hz, side)
             figures = (f"{e.mean():+.1f}", f"{e.std(ddof=1):.1f}", f"{np.abs(e).mean():.1f}")
             rows.append((f"{rate_hz:g}", side, str(len(e)), *figures, f"{np.abs(e).max():.0f}"))
-    both = 1e3 * np.concatenate([stride_errors(COPIES[0], RATE, side) for side in SIDES])
+    pair = 1e3 * np.concatenate([stride_errors(COPIES[0], RATE, side) for side in SIDES])
     record_in_short(
         "Stride time ms",
         "–",
-        f"{both.mean():+.1f} ± {both.std(ddof=1):.1f} (n={len(both)})",
+        f"{pair.mean():+.1f} ± {pair.std(ddof=1):.1f} (n={len(pair)})",
         "gaitmap_foot, 1 person, against motion capture",
     )
     record(

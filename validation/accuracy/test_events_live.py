@@ -16,29 +16,31 @@ from validation.figures import record
 WALKS = ("gaitmap_foot", "neura_walk")
 
 
-def streamed(here: Orientations, side: Side, block: int) -> list[tuple[str, float, float]]:
+def streamed(place: Orientations, side: Side, block: int) -> list[tuple[str, float, float]]:
     """(kind, time, moment it is known) of a foot, its samples arriving in blocks."""
     foot = FOOT[side]
-    s, valid = pitch_signal(here.q[foot]), here.valid[foot]
-    state = FootPitchState.start(here.rate_hz, FootPitchParams())
+    s, valid = pitch_signal(place.q[foot]), place.valid[foot]
+    state = FootPitchState.start(place.rate_hz, FootPitchParams())
     events: list[tuple[str, float, float]] = []
     for first in range(0, len(s), block):
         part = slice(first, first + block)
-        for kind, index, known, offset in zip(*advance_foot_pitch(state, s[part], valid[part]), strict=True):
-            assert first <= known < first + block, "an event is told in the block in which it is known"
-            time = float(here.t_s[index] + offset / here.rate_hz)
-            events.append((KINDS[kind], time, float(here.t_s[known])))
+        for kind, index, reference, offset in zip(
+            *advance_foot_pitch(state, s[part], valid[part]), strict=True
+        ):
+            assert first <= reference < first + block, "an event is told in the block in which it is known"
+            time = float(place.t_s[index] + offset / place.rate_hz)
+            events.append((KINDS[kind], time, float(place.t_s[reference])))
     return events
 
 
 @pytest.mark.parametrize("name", WALKS)
 @pytest.mark.parametrize("block", [1, 7, 100])
 def test_a_stream_gives_the_same_bits_as_the_file(name: str, block: int) -> None:
-    here = take(name)
-    offline = detect(here).events
+    address = take(name)
+    offline = detect(address).events
     for side in SIDES:
         expected = [(e.kind, e.time_s, e.detected_s) for e in offline if e.side == side]
-        assert sorted(streamed(here, side, block), key=lambda e: e[1]) == expected
+        assert sorted(streamed(address, side, block), key=lambda e: e[1]) == expected
 
 
 def test_the_delay_is_written_down() -> None:

@@ -1,8 +1,7 @@
 """Steps of one lower-back sensor against INDIP on mobgap_lowback, and against the feet on neura_walk.
 
-Nothing was fitted on these recordings: the scale of the Gaussian is 64 ms at the step time of Test5
-(docs/science/trunk-steps.md, "Parameters"), the least prominence lies on a plateau (0.15 to 0.4 m/s² give the
-same F1).
+Not fitted to these recordings, except that the Gaussian's scale is 64 ms at the step time of Test5
+(docs/science/trunk-steps.md, "Parameters"); prominences of 0.15 to 0.4 m/s² give the same F1.
 """
 
 from __future__ import annotations
@@ -75,27 +74,27 @@ def test_the_cadence_agrees_with_the_insoles(trial: tuple[str, str]) -> None:
 
 
 def test_a_foot_that_is_told_is_the_right_one() -> None:
-    told = right = 0
+    is_reported = right = 0
     for trial, period, _ in scores():
         for step in found(trial).steps:
             nearest = int(np.argmin(np.abs(period.contacts - step.time_s)))
             if step.side is not None and abs(period.contacts[nearest] - step.time_s) <= WINDOW_S:
-                told += 1
+                is_reported += 1
                 right += step.side == period.sides[nearest]
-    assert told >= 30
-    assert right == told
+    assert is_reported >= 30
+    assert right == is_reported
 
 
 def test_the_feet_of_neura_walk_are_told_right() -> None:
     steps = detect_steps(only(neura_walk(), "pelvis")).steps
     heels = [(t, side) for side in SIDES for t in heel_stops(side)]
-    told = 0
+    is_reported = 0
     for step in steps:
         time, side = min(heels, key=lambda h: abs(h[0] - step.time_s))
         if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
-            told += 1
+            is_reported += 1
             assert step.side == side
-    assert told >= 10
+    assert is_reported >= 10
 
 
 def test_every_walk_of_the_reference_is_in_a_bout() -> None:
@@ -121,7 +120,7 @@ def test_write_down_the_figures() -> None:
     for trial in TRIALS:
         results = [score for t, _, score in scores() if t == trial]
         walks = periods(trial)
-        counted, reference = sum(len(inside(trial, p)) for p in walks), sum(len(p.contacts) for p in walks)
+        total, reference = sum(len(inside(trial, p)) for p in walks), sum(len(p.contacts) for p in walks)
         errors = np.concatenate([r.errors for r in results])
         ours, theirs = (
             cadence([np.array(inside(trial, p)) for p in walks]),
@@ -132,11 +131,11 @@ def test_write_down_the_figures() -> None:
             (
                 " ".join(trial),
                 f"{f1(results):.2f}",
-                f"{counted}/{reference}",
+                f"{total}/{reference}",
                 f"{ours:.1f}/{theirs:.1f}",
                 f"{1e3 * np.mean(errors):+.0f}",
                 f"{1e3 * np.std(errors, ddof=1):.0f}",
-                str(len(sides) - counted),
+                str(len(sides) - total),
                 f"{len(sides) - sides.count(None)}",
             )
         )

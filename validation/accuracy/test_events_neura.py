@@ -1,11 +1,10 @@
-"""Contacts on neura_walk, whole chain from the sensor files, against still flags and the heel marker.
+"""Contacts on neura_walk, whole chain, against still flags and the heel marker.
 
-Initial contact from the Vicon heel marker: the moment the marker's speed falls below 0.5 m/s for the last
-time before the foot is still, interpolated between samples (a velocity criterion as in Ghoussayni et al.
-2004, Gait & Posture 20:266). The threshold was chosen so that it agrees with the data set's own description
-(the still flag rises 0.24 to 0.35 s after the heel stops); a lower and a higher one are reported beside it.
-The vertical velocity alone does not tell the contact here: the heel skims the floor at 2 to 3 m/s for 0.1 s
-before it stops. The lag between IMU and Vicon (0 to 3 samples) is not removed.
+Initial contact from the Vicon heel marker: its speed falls below 0.5 m/s for the last time before the foot is
+still, interpolated (velocity criterion as in Ghoussayni et al. 2004, Gait & Posture 20:266). The threshold
+agrees with the data set's description (the still flag rises 0.24 to 0.35 s after the heel stops); a lower and
+a higher one are also reported. Vertical velocity is no criterion here: the heel skims the floor at 2 to 3 m/s
+for 0.1 s. The lag between IMU and Vicon (0 to 3 samples) is not removed.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Contacts of the product and of the published pitch rule against every reference, side by side.
+"""Contacts of the product and of the published pitch rule against every reference.
 
-Nothing is tuned to one of them: shares of slap and push-off were chosen on ipol_walks, gaitmap_foot and
-force_plate_steps together (docs/science/events.md, "Refinement"); what is for swings without pitch alone was
-chosen on ipol_walks. neura_walk was not used.
+Shares of slap and push-off were chosen on ipol_walks, gaitmap_foot and force_plate_steps together
+(docs/science/events.md, "Refinement"), parameters for swings without pitch on ipol_walks. neura_walk was not
+used.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class FoundEvents:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Errors in ms of the events that have a reference, their uncertainties, how many missed and too many.
+    """Event errors in ms, their uncertainties, missed and extra events.
 
-    extra : while the reference goes on. after : told later than its last event of any foot, too many too.
+    extra : within the reference. after : extra events later than the reference's last event of any foot.
     """
 
     ms: Floats
@@ -78,7 +78,7 @@ class Errors:
 
     @property
     def precision_to_the_end(self) -> float:
-        """With what is told after the reference ends."""
+        """Precision including events after the end of the reference."""
         return len(self.ms) / (len(self.ms) + self.extra + self.after)
 
 
@@ -87,10 +87,10 @@ def run(recording: Recording) -> FoundEvents:
     orientations = estimate_orientations(calibrated)
     motions = measure_foot_movements(calibrated)
     refined = detect_contacts(orientations, motions=motions)
-    found = {"foot_contact": refined, "foot_pitch": detect(orientations)}
+    result = {"foot_contact": refined, "foot_pitch": detect(orientations)}
     turning = calibrated.calibration.turning
-    strides = {name: stride_list(x, orientations, turning).select_used() for name, x in found.items()}
-    return FoundEvents(found, strides)
+    strides = {name: stride_list(x, orientations, turning).select_used() for name, x in result.items()}
+    return FoundEvents(result, strides)
 
 
 @cache
@@ -105,7 +105,7 @@ def checked(trial: str, side: Side, kind: EventKind) -> tuple[float, ...]:
 
 
 def last_checked(trial: str) -> float:
-    """Last hand-checked event of any foot, s: what the feet do later nobody said."""
+    """Last manually checked event of any foot, s."""
     return max(t for side, kind in product(SIDES, KINDS) for t in checked(trial, side, kind))
 
 
@@ -122,11 +122,11 @@ def neura() -> FoundEvents:
 @cache
 def plate() -> FoundEvents:
     orientations, motion, _, _ = force_plate.take()
-    found = {
+    result = {
         "foot_contact": detect_contacts(orientations, motions={"foot_r": motion}),
         "foot_pitch": detect(orientations),
     }
-    return FoundEvents(found, {})
+    return FoundEvents(result, {})
 
 
 def against(
@@ -135,8 +135,10 @@ def against(
     own = [e for e in events.events if (e.side, e.kind) == (side, kind)]
     score = match([e.time_s for e in own], reference, WINDOW_S)
     stated = [e.uncertainty_s or np.nan for e in own if e.time_s not in score.extra]
-    after = sum(t > until for t in score.extra)
-    return Errors(1e3 * score.errors, 1e3 * np.array(stated), score.missed, len(score.extra) - after, after)
+    final_total = sum(t > until for t in score.extra)
+    return Errors(
+        1e3 * score.errors, 1e3 * np.array(stated), score.missed, len(score.extra) - final_total, final_total
+    )
 
 
 def pooled(parts: list[Errors]) -> Errors:
@@ -177,26 +179,26 @@ def shares_off(subject: str, rule: str) -> tuple[float, float, int]:
     swing, double = [], []
     for trial in (t for t in WALKS if t.startswith(subject)):
         for s in ipol(trial).strides[rule]:
-            other: Side = "right" if s.side == "left" else "left"
+            other_side: Side = "right" if s.side == "left" else "left"
             ours = (s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s)
             places: tuple[tuple[Side, EventKind], ...] = (
-                (s.side, "ic"), (s.side, "tc"), (s.side, "ic"), (other, "tc"), (other, "ic"),
+                (s.side, "ic"), (s.side, "tc"), (s.side, "ic"), (other_side, "tc"), (other_side, "ic"),
             )  # fmt: skip
             if any(x is None for x in ours):
                 continue
-            found = np.array(ours, np.float64)
+            values = np.array(ours, np.float64)
             true = np.array(
                 [
                     min(checked(trial, *place), key=lambda t, x=x: abs(t - x))  # type: ignore[misc]
-                    for x, place in zip(found, places, strict=True)
+                    for x, place in zip(values, places, strict=True)
                 ]
             )
-            if np.abs(found - true).max() > WINDOW_S:
+            if np.abs(values - true).max() > WINDOW_S:
                 continue
             shares = []
-            for start, off, end, other_off, other_on in (found, true):
-                both = (other_off - start) + (off - other_on)
-                shares.append((100 * (end - off) / (end - start), 100 * both / (end - start)))
+            for start, off, end, other_off, other_on in (values, true):
+                pair = (other_off - start) + (off - other_on)
+                shares.append((100 * (end - off) / (end - start), 100 * pair / (end - start)))
             swing.append(shares[0][0] - shares[1][0])
             double.append(shares[0][1] - shares[1][1])
     return float(np.mean(swing)), float(np.mean(double)), len(swing)
@@ -204,13 +206,13 @@ def shares_off(subject: str, rule: str) -> tuple[float, float, int]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_contacts_are_those_of_the_hand_checked_walks(kind: EventKind) -> None:
-    found = errors("ipol_walks", "foot_contact", kind)
-    assert abs(found.mean) <= 12
-    assert found.sd <= 22
-    assert found.sensitivity >= 0.97
-    assert found.precision >= 0.99
+    result = errors("ipol_walks", "foot_contact", kind)
+    assert abs(result.mean) <= 12
+    assert result.sd <= 22
+    assert result.sensitivity >= 0.97
+    assert result.precision >= 0.99
     # with what the feet do after the last event that anybody marked
-    assert found.precision_to_the_end >= (0.99 if kind == "ic" else 0.985)
+    assert result.precision_to_the_end >= (0.99 if kind == "ic" else 0.985)
 
 
 def test_no_swing_of_the_hand_checked_walks_is_impossibly_short() -> None:
@@ -247,10 +249,10 @@ def test_force_and_motion_capture_lie_on_both_sides(kind: EventKind) -> None:
 @pytest.mark.parametrize("copy", COPIES)
 @pytest.mark.parametrize("rate_hz", [60.0, 100.0, 128.0])
 def test_neither_the_sample_rate_nor_the_mounting_moves_a_contact(copy: str, rate_hz: float) -> None:
-    found = run(recording_of(resampled(copy, rate_hz), rate_hz)).events["foot_contact"]
+    result = run(recording_of(resampled(copy, rate_hz), rate_hz)).events["foot_contact"]
     for side, kind in product(SIDES, KINDS):
-        here = against(found, side, kind, mocap(side, kind))
-        clear = here.ms[here.stated_ms < 40.0]
+        address = against(result, side, kind, mocap(side, kind))
+        clear = address.ms[address.stated_ms < 40.0]
         assert abs(clear.mean()) <= 26
         assert clear.std(ddof=1) <= 11
         assert abs(clear.mean() - errors(f"gaitmap_foot {side}", "foot_contact", kind).mean) <= 8
@@ -258,11 +260,11 @@ def test_neither_the_sample_rate_nor_the_mounting_moves_a_contact(copy: str, rat
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_stated_uncertainty_is_that_of_the_errors(kind: EventKind) -> None:
-    """Over all references together: neither half as large nor twice as large as what was found."""
+    """Stated uncertainty within half and twice the observed error over all references."""
     for name in ("ipol_walks", "gaitmap_foot"):
-        found = errors(name, "foot_contact", kind)
-        rms = float(np.sqrt(np.mean(found.ms**2)))
-        stated = float(np.sqrt(np.mean(found.stated_ms**2)))
+        result = errors(name, "foot_contact", kind)
+        rms = float(np.sqrt(np.mean(result.ms**2)))
+        stated = float(np.sqrt(np.mean(result.stated_ms**2)))
         assert 0.5 <= rms / stated <= 1.6, name
 
 
@@ -283,8 +285,8 @@ def test_write_down_the_figures() -> None:
         e = errors("ipol_walks", rule, kind)
         heel = errors("neura_walk", rule, "ic")
         met = f"{heel.mean:+.0f} ± {heel.sd:.0f} ({len(heel.ms)}/14)" if kind == "ic" else ""
-        counted = tuple(f"{x:.3f}" for x in (e.sensitivity, e.precision, e.precision_to_the_end))
-        rows.append((kind.upper(), NAMES[rule], *cells, met, *counted))
+        counted_strides = tuple(f"{x:.3f}" for x in (e.sensitivity, e.precision, e.precision_to_the_end))
+        rows.append((kind.upper(), NAMES[rule], *cells, met, *counted_strides))
     record(
         "Contacts against every reference",
         ("event", "detector", *columns, "neura_walk heel", "sensitivity", "precision", "to the end"),

@@ -30,11 +30,11 @@ def test_no_contact_is_missed_or_invented_on_any_script() -> None:
         orientations = estimate_orientations(
             calibration.calibrate(timeline.synchronise(simulation.recording))
         )
-        found = events.detect(orientations)
+        detections = events.detect(orientations)
         for side in SIDES:
             truth = simulation.truth.contacts[side]
-            ic = match(found.times(side, "ic"), truth.contact.tolist())
-            tc = match(found.times(side, "tc"), truth.lift5[np.isfinite(truth.lift5)].tolist())
+            ic = match(detections.times(side, "ic"), truth.contact.tolist())
+            tc = match(detections.times(side, "tc"), truth.lift5[np.isfinite(truth.lift5)].tolist())
             assert (ic.missed, len(ic.extra), tc.missed, len(tc.extra)) == (0, 0, 0, 0), (name, side)
             assert abs(float(np.median(ic.errors))) <= 0.010
             rows.append(
@@ -66,14 +66,14 @@ def test_refined_contacts_leave_stance_right_on_simulated_people() -> None:
         take, truth = simulated(name)
         calibrated = calibration.calibrate(take)
         orientations = estimate_orientations(calibrated)
-        found = detect_contacts(orientations, motions=measure_foot_movements(calibrated))
+        contacts = detect_contacts(orientations, motions=measure_foot_movements(calibrated))
         for side in SIDES:
             true = truth.contacts[side]
-            ic = match(found.times(side, "ic"), true.contact.tolist(), 0.25)
-            tc = match(found.times(side, "tc"), true.release[np.isfinite(true.release)].tolist(), 0.25)
+            ic = match(contacts.times(side, "ic"), true.contact.tolist(), 0.25)
+            tc = match(contacts.times(side, "tc"), true.release[np.isfinite(true.release)].tolist(), 0.25)
             if not len(ic.errors):
                 assert name == "severe_shuffle"
-                assert "no_toe_off" in {n.code for n in found.notices}
+                assert "no_toe_off" in {n.code for n in contacts.notices}
                 rows.append((name, side, "refused", "", "", "", "", ""))
                 continue
             assert ic.missed + tc.missed <= 2, (name, side)

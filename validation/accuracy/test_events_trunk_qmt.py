@@ -32,17 +32,17 @@ PLACES: dict[str, Segment] = {"hip": "pelvis", "lower_back": "pelvis", "upper_ba
 
 
 @cache
-def take(worn: tuple[tuple[Segment, str], ...]) -> UniformRecording:
+def take(segments: tuple[tuple[Segment, str], ...]) -> UniformRecording:
     """Some of the sensors on some segments."""
     data = loadmat(
         data_folder("qmt_fullbody") / "full_body_example_data.mat", squeeze_me=True, struct_as_record=False
     )
     sensors = {}
-    for segment, name in worn:
+    for segment, name in segments:
         acc, gyr = (np.array(getattr(data[name], k), np.float64) for k in ("acc", "gyr"))
-        there = np.ones(len(acc), np.bool_)
-        sensors[segment] = SensorSignals(name, acc, gyr, None, there, ~there)
-    n = len(there)
+        mask = np.ones(len(acc), np.bool_)
+        sensors[segment] = SensorSignals(name, acc, gyr, None, mask, ~mask)
+    n = len(mask)
     return UniformRecording(np.arange(n) / RATE, RATE, sensors, Subject(), "walk", {})
 
 
@@ -84,20 +84,20 @@ def test_the_cadence_is_that_of_the_feet(place: str) -> None:
 @pytest.mark.parametrize("place", ["hip", "lower_back"])
 def test_the_feet_are_told_right(place: str) -> None:
     steps = detect_steps(take(((PLACES[place], place),))).steps
-    told = 0
+    is_reported = 0
     for step in steps:
         time, side = min(contacts(), key=lambda c: abs(c[0] - step.time_s))
         if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
-            told += 1
+            is_reported += 1
             assert step.side == side
-    assert told >= 80
+    assert is_reported >= 80
 
 
 @pytest.mark.parametrize("place", PLACES)
 def test_the_turns_of_the_walk_are_found(place: str) -> None:
-    """Upstream's description: turns at 115 and 138.5 s of its clock, that starts at 40 s.
+    """Upstream description: turns at 115 and 138.5 s of its clock, which starts at 40 s.
 
-    The take ends in the second one, so that it is not listed: how far it went nobody saw.
+    The trial ends within the second turn, which is therefore not listed.
     """
     signals = take(((PLACES[place], place),)).sensors[PLACES[place]]
     listed = [
@@ -117,8 +117,8 @@ def test_write_down_the_figures() -> None:
         result, steps = score(place), detect_steps(take(((segment, place),)))
         e = 1e3 * result.errors
         n = len(e) + result.missed
-        told = sum(s.side is not None for s in steps.steps)
-        figures = (f"{e.mean():+.0f}", f"{e.std(ddof=1):.0f}", f"{steps.cadence_spm:.1f}", str(told))
+        total = sum(s.side is not None for s in steps.steps)
+        figures = (f"{e.mean():+.0f}", f"{e.std(ddof=1):.0f}", f"{steps.cadence_spm:.1f}", str(total))
         rows.append((place, f"{len(e)}/{n}", str(len(result.extra)), *figures))
     record(
         "Steps of one trunk sensor on qmt_fullbody",

@@ -1,9 +1,9 @@
-"""Parts of stance, pitch and path of the feet on gaitmap_foot against the markers of the shoe.
+"""Parts of stance, pitch and path of the feet on gaitmap_foot against shoe markers.
 
-Markers: FCC heel, TOE tip, FM5 fifth metatarsal head. Their own pitch is that of the line from heel to tip,
-less its mean in the quiet part of stance. The limit of 3° is a centimetre of a foot, fitted to nothing.
-Nobody measured where the sensor sits on the shoe: 5 cm in front of the heel marker was found from the heel's
-path here, so that clearance shows the spread and the toe's dip, not how well a tape does.
+Markers: FCC heel, TOE tip, FM5 fifth metatarsal head. Marker pitch is that of the heel–tip line less its mean
+in quiet stance. The 3° limit is 1 cm over a foot, not fitted. The sensor position on the shoe, 5 cm in front
+of the heel marker, was estimated from the heel's path here, so clearance shows spread and minimum, not the
+accuracy of a tape.
 """
 
 from __future__ import annotations
@@ -90,9 +90,9 @@ def test_parts_of_stance_are_those_of_the_markers() -> None:
         lifted = np.array([lift_pct(side, t, s) for s in strides(side)])
         error = ours - same
         rows += [
-            [side, what, f"{len(ours)}", f"{ours[:, i].mean():.1f}", spread(error[:, i], ".1f"),
+            [side, label, f"{len(ours)}", f"{ours[:, i].mean():.1f}", spread(error[:, i], ".1f"),
              spread(ours[:, i] - lifted[:, k], ".1f")]
-            for what, i, k in (("loading_pct", 0, 0), ("push_pct", 2, 1))
+            for label, i, k in (("loading_pct", 0, 0), ("push_pct", 2, 1))
         ]  # fmt: skip
         assert np.abs(error.mean(axis=0)).max() < 1.5
         assert error.std(axis=0).max() < 2.0
@@ -163,7 +163,7 @@ def test_heel_and_toe_pass_the_floor_as_their_markers_do() -> None:
     tracks, measured = gait()
     assert tracks.feet is not None
     body, _ = nominal_body(None, None, SHOE)
-    again = measure_gait(replace(tracks, feet=replace(tracks.feet, body=body)))
+    second_gait = measure_gait(replace(tracks, feet=replace(tracks.feet, body=body)))
     rows = []
     for side in SIDES:
         foot = markers(side)
@@ -171,14 +171,14 @@ def test_heel_and_toe_pass_the_floor_as_their_markers_do() -> None:
         own = [i for i, s in enumerate(measured.strides.strides) if s in strides(side)]
         heights = np.array([clearance(foot, t, s) for s in strides(side)])
         for name, true in zip(("max_heel_clearance_m", "min_toe_clearance_m"), heights.T, strict=True):
-            column = again.columns[name]
+            column = second_gait.columns[name]
             ours = 1000 * np.array([column[i] for i in own], np.float64)
-            both = np.isfinite(ours) & np.isfinite(true)
-            error = (ours - 1000 * true)[both]
+            pair = np.isfinite(ours) & np.isfinite(true)
+            error = (ours - 1000 * true)[pair]
             rows.append(
-                [side, name, f"{both.sum()}/{len(own)}", f"{ours[both].mean():.0f}", spread(error, ".0f")]
+                [side, name, f"{pair.sum()}/{len(own)}", f"{ours[pair].mean():.0f}", spread(error, ".0f")]
             )
-            assert both.sum() >= 0.8 * len(own)
+            assert pair.sum() >= 0.8 * len(own)
             assert abs(error.mean()) < (15.0 if "heel" in name else 10.0)
             assert error.std() < 12.0
     record(

@@ -52,10 +52,10 @@ def on_neura() -> FilterComparison:
     return compare(neura_analysis(), OrientationTable("Vicon", t_s, q))
 
 
-def error_deg(found: FilterComparison, name: str | None) -> tuple[float, float] | None:
+def error_deg(result: FilterComparison, name: str | None) -> tuple[float, float] | None:
     """RMS over all segments, total and inclination; None where the filter needs a magnetometer."""
-    assert found.reference is not None
-    scores = list(found.reference.scores[name].values())
+    assert result.reference is not None
+    scores = list(result.reference.scores[name].values())
     if not scores:
         return None
     total, inclination = (
@@ -78,14 +78,14 @@ def test_the_reference_is_laid_where_the_trigger_says() -> None:
 def test_every_filter_on_both_takes() -> None:
     rows: list[tuple[float, list[str]]] = []
     for name, label in ((None, "Sagittal, as analysed"), *LABELS.items()):
-        errors = [error_deg(found, name) for found in (on_truth(), on_neura())]
+        errors = [error_deg(result, name) for result in (on_truth(), on_neura())]
         cells = ["–" if e is None else f"{e[0]:.1f} / {e[1]:.1f}" for e in errors]
         if errors[0] is not None:
             rows.append((errors[0][0], [label, *cells]))
     rows.sort(key=lambda row: (round(row[0], 1), row[1][0]))  # filters that are as good go by name
     knees = [
-        [float(np.degrees(s.rms)) for s in found.spreads if s.name.startswith("knee_flexion")]
-        for found in (on_truth(), on_neura())
+        [float(np.degrees(s.rms)) for s in result.spreads if s.name.startswith("knee_flexion")]
+        for result in (on_truth(), on_neura())
     ]
     spread = " and ".join(f"{np.mean(k):.1f}°" for k in knees)
     record(

@@ -44,15 +44,15 @@ def self_calibrated(calibrated: CalibratedRecording, *, both_ways: bool) -> Orie
         signals = recording.sensors[segment]
         gyr, acc = (signals.gyr - mounted.gyro_bias)[:, None], signals.acc[:, None]
         run = SelfCalibratingFilter(recording.rate_hz, magnetometer=False)
-        found = (run.smooth(gyr, acc) if both_ways else run.advance(gyr, acc))[:, 0]
-        found[1:] = normalise(
-            found[:-1] + found[1:] * np.sign(np.sum(found[1:] * found[:-1], axis=1))[:, None]
+        result = (run.smooth(gyr, acc) if both_ways else run.advance(gyr, acc))[:, 0]
+        result[1:] = normalise(
+            result[:-1] + result[1:] * np.sign(np.sum(result[1:] * result[:-1], axis=1))[:, None]
         )
         start = mounted.start_q
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor) if start is None else start
-        at = min(round(0.5 * sum(calibration.zero) * recording.rate_hz), len(found) - 1)
-        heading = multiply(start, conjugate(found[at])) * [1.0, 0.0, 0.0, 1.0]
-        sensor = multiply(normalise(heading), found)
+        index = min(round(0.5 * sum(calibration.zero) * recording.rate_hz), len(result) - 1)
+        heading = multiply(start, conjugate(result[index])) * [1.0, 0.0, 0.0, 1.0]
+        sensor = multiply(normalise(heading), result)
         q[segment] = multiply(sensor, conjugate(from_matrix(mounted.R_segment_sensor)))
         valid[segment] = signals.valid
     q, _, _ = remove_relative_drift(q, valid, calibration, recording.rate_hz, DriftParams())
@@ -70,9 +70,9 @@ def on_neura(name: str) -> Floats:
     """RMSE (3,) of hip, knee, ankle flexion, offset removed, mean of both sides, °."""
     calibrated = calibrate(neura_walk())
     angles = measure_angles(orient(calibrated, name), calibrated.calibration.zero)
-    found = {n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()}
+    result = {n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()}
     assert neura_reference()
-    _, score = scores(found)
+    _, score = scores(result)
     return np.array([np.mean([score[f"{n}_{side}"].offset_removed for side in "rl"]) for n in FLEXION])
 
 

@@ -39,11 +39,11 @@ feet"). Errors add to a score as squares, so they show most on the legs that are
 Judged = tuple[dict[tuple[str, Side | None], Flag], Scores]
 
 
-def _judged(curves: CycleCurves, of: MeasuredGait, standing: dict[str, float]) -> Judged:
-    found = judge_flags(curves, of.parameters, standing, HEIGHT_M)
+def _judged(curves: CycleCurves, source: MeasuredGait, standing: dict[str, float]) -> Judged:
+    flags = judge_flags(curves, source.parameters, standing, HEIGHT_M)
     # a ratio has no fixed side: its own name is enough
-    by = {(f.name, None if f.kind == "ratio" else f.side): f for f in found}
-    return by, score_curves(curves, standing)
+    by_key = {(f.name, None if f.kind == "ratio" else f.side): f for f in flags}
+    return by_key, score_curves(curves, standing)
 
 
 @cache
@@ -71,9 +71,9 @@ def walk(name: str, seed: int = 5) -> tuple[Judged, Judged]:
 
 @pytest.mark.parametrize("name", PEOPLE)
 def test_the_chain_raises_the_flags_of_the_truth(name: str) -> None:
-    (true, _), (found, _) = walk(name)
+    (true, _), (result, _) = walk(name)
     for key, flag in true.items():
-        mine = found[key]
+        mine = result[key]
         if "sides_alike" in (flag.reason, mine.reason):
             # beyond the limit, and about as far apart as two sides are known to: said or left unsaid
             assert flag.value is not None
@@ -91,22 +91,22 @@ def test_the_chain_raises_the_flags_of_the_truth(name: str) -> None:
 def test_scores_are_near_those_of_the_truth() -> None:
     rows = []
     for name in PEOPLE:
-        (by_truth, true), (by_chain, found) = walk(name)
-        shown = []
+        (by_truth, true), (by_chain, result) = walk(name)
+        view = []
         for mode in ("raw", "offset_removed"):
             for side in ("left", "right"):
-                a, b = (s.find("gps_sagittal_deg", mode, side).value for s in (found, true))
+                a, b = (s.find("gps_sagittal_deg", mode, side).value for s in (result, true))
                 assert a is not None
                 assert b is not None
                 assert abs(a - b) < SCORE_DEG, (name, mode, side)
-                shown.append(f"{a:.1f} / {b:.1f}")
+                view.append(f"{a:.1f} / {b:.1f}")
         raised = [
-            {f"{k[0]} {k[1] or ''}".strip() for k, f in by.items() if f.exceeded}
-            for by in (by_truth, by_chain)
+            {f"{k[0]} {k[1] or ''}".strip() for k, f in by_key.items() if f.exceeded}
+            for by_key in (by_truth, by_chain)
         ]
-        both = ", ".join(sorted(raised[0] & raised[1])).replace("_", " ") or "none"
-        other = ", ".join(sorted(raised[0] ^ raised[1])).replace("_", " ") or "none"
-        rows.append([name, *shown, both, other])
+        pair = ", ".join(sorted(raised[0] & raised[1])).replace("_", " ") or "none"
+        second = ", ".join(sorted(raised[0] ^ raised[1])).replace("_", " ") or "none"
+        rows.append([name, *view, pair, second])
     record(
         "Scores and flags of virtual people",
         [

@@ -1,9 +1,8 @@
-"""What bounds flexion on neura_walk: how much of its error any constant change of mounting could take away.
+"""Bounds on flexion error on neura_walk: reduction possible by constant changes of alignment.
 
-The reference decides here, so none of these figures is one of the product. The mountings of a joint's two
-segments are turned so that flexion agrees best with Vicon: about the vertical alone (the forward axis), then
-freely. What a gain then takes off bends with the joint, as skin does, or a marker's axis that is not the
-joint's. What is left changes with time otherwise.
+The reference decides here, so these are not results of the product. Both segments' alignments are rotated for
+the best agreement with Vicon, about the vertical alone (anterior axis), then freely. A gain then removes
+errors proportional to flexion, such as skin movement or marker axes.
 """
 
 from __future__ import annotations
@@ -65,31 +64,31 @@ def fit_turns(name: str, side: Side, free: tuple[int, ...]) -> Floats:
         # the turn that a constant offset leaves free is held by a weak pull to nothing
         return np.concatenate((error(x), 1e-2 * x))
 
-    found = least_squares(residual, np.zeros(len(free)))
-    return error(found.x) if len(free) else error(np.zeros(0))
+    result = least_squares(residual, np.zeros(len(free)))
+    return error(result.x) if len(free) else error(np.zeros(0))
 
 
 def leave_after_gain(error: Floats, true: Floats) -> float:
-    """SD in degrees of what a share of the angle does not explain."""
+    """SD in degrees not explained by a share of the angle."""
     x = true - true.mean()
     return float(np.std(error - (error @ x) / (x @ x) * x))
 
 
 def test_write_down_what_bounds_flexion() -> None:
-    _, found = scores(healthy().angles_deg)
+    _, result = scores(healthy().angles_deg)
     rows = []
     for name in JOINTS:
         for side in reversed(SIDES):
-            score, true = found[f"{name}_{SUFFIX[side]}"], reference()[f"{name}_{SUFFIX[side]}"][WALK]
-            given = fit_turns(name, side, ())
-            assert given.std() == pytest.approx(score.offset_removed, abs=0.05)
+            score, true = result[f"{name}_{SUFFIX[side]}"], reference()[f"{name}_{SUFFIX[side]}"][WALK]
+            inputs = fit_turns(name, side, ())
+            assert inputs.std() == pytest.approx(score.offset_removed, abs=0.05)
             best = [fit_turns(name, side, free) for free in FREE.values()]
-            assert given.std() + 1e-6 >= best[0].std() >= best[1].std() - 1e-6
+            assert inputs.std() + 1e-6 >= best[0].std() >= best[1].std() - 1e-6
             left = leave_after_gain(best[0], true)
             rows.append(
                 [
                     f"{name.replace('_', ' ')}, {side}",
-                    *(f"{x:.1f}" for x in (score.raw, given.std(), *(e.std() for e in best), left)),
+                    *(f"{x:.1f}" for x in (score.raw, inputs.std(), *(e.std() for e in best), left)),
                 ]
             )
     header = [

@@ -1,8 +1,8 @@
-"""Forward axes by likelihood against the truth of virtual patients, and how honest their uncertainty is.
+"""Anterior axes by likelihood against the truth of virtual patients, and their stated uncertainty.
 
-Truth is the way walked, seen in each sensor's rest world: where a segment truly faces while its person
-stands, less where the pelvis faces. Spreads of the single measures were taken from these people and from what
-measures of neura_walk and qmt_fullbody differ (docs/science/calibration.md, "Forward by likelihood").
+Truth is the walking direction in each sensor's rest world: true heading of the segment in standing, less the
+pelvis's. Spreads of the measures come from these people and from neura_walk and qmt_fullbody
+(docs/science/calibration.md, "Forward by likelihood").
 """
 
 from __future__ import annotations
@@ -46,22 +46,24 @@ def find_errors(recording: UniformRecording, truth: WalkTruth) -> list[ForwardEr
     calibration = calibrate(recording).calibration
     standing = index_window(calibration.zero, recording.rate_hz)
     facing = {s: float(np.angle(np.exp(1j * yaw(truth.q[s][standing])).mean())) for s in truth.q}
-    found = []
+    result = []
     for s, x in calibration.segments.items():
         ahead = (x.R_segment_sensor @ to_matrix(truth.mounts[s].q_segment_sensor).T)[:, 0]
         off = float(wrap_angle(np.arctan2(ahead[2], ahead[0]) + facing[s] - facing["pelvis"]))
         facts = cast("Mapping[str, Any]", calibration.diagnostics[s])
         single = {v["source"]: float(np.degrees(wrap_angle(off + v["off_rad"]))) for v in facts["votes"]}
         assert x.forward_sd is not None
-        told = any(n.code == "forward_uncertain" and n.sensor == s for n in calibration.notices)
-        found.append(ForwardError(s, float(np.degrees(off)), float(np.degrees(x.forward_sd)), told, single))
-    return found
+        notices = any(n.code == "forward_uncertain" and n.sensor == s for n in calibration.notices)
+        result.append(
+            ForwardError(s, float(np.degrees(off)), float(np.degrees(x.forward_sd)), notices, single)
+        )
+    return result
 
 
 @cache
 def all_errors() -> dict[str, tuple[list[ForwardError], list[ForwardError]]]:
     """Patient → errors with seven sensors, and with pairs of them alone."""
-    found = {}
+    result = {}
     for name in PATIENTS:
         seven: list[ForwardError] = []
         pairs: list[ForwardError] = []
@@ -70,8 +72,8 @@ def all_errors() -> dict[str, tuple[list[ForwardError], list[ForwardError]]]:
             seven += find_errors(recording, truth)
             for pair in PAIRS if seed == 0 else ():
                 pairs += find_errors(only(recording, *pair), truth)
-        found[name] = seven, pairs
-    return found
+        result[name] = seven, pairs
+    return result
 
 
 def rms(values: list[float]) -> float:
@@ -84,8 +86,8 @@ def test_patients_have_forward_axes_within_six_degrees() -> None:
         loose = [e for e in seven if e.segment not in FOOT.values()]
         row = [name, f"{rms([e.off for e in loose]):.1f}", f"{max(abs(e.off) for e in loose):.1f}"]
         for source in ("velocity", "acceleration"):
-            alone = [e.single[source] for e in loose if source in e.single]
-            row.append(f"{rms(alone):.1f}" if alone else "–")
+            separate = [e.single[source] for e in loose if source in e.single]
+            row.append(f"{rms(separate):.1f}" if separate else "–")
         feet = [e.off for e in seven if e.segment in FOOT.values()]
         rows.append([*row, f"{rms(feet):.1f}", f"{max(e.sd for e in seven):.1f}"])
         assert max(abs(e.off) for e in loose) < 6.0

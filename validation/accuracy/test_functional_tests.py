@@ -43,25 +43,25 @@ def tug_errors(segment: Segment, patient: str) -> dict[str, tuple[float, ...]]:
     """Segment, "total" → found − true duration in s, of every seed."""
     errors: dict[str, list[float]] = {name: [] for name in (*PARTS, "total")}
     for seed in SEEDS:
-        made = simulate_tug(patient, seed, setup=replace(ON_SKIN, worn=(segment,)), left=seed % 2 == 1)
-        found = measure_tug(follow_trunk(synchronise(made.recording)))
-        got = {p.name: p.mean for p in found.parameters}
-        for part in made.truth.segments:
+        simulation = simulate_tug(patient, seed, setup=replace(ON_SKIN, worn=(segment,)), left=seed % 2 == 1)
+        result = measure_tug(follow_trunk(synchronise(simulation.recording)))
+        got = {p.name: p.mean for p in result.parameters}
+        for part in simulation.truth.segments:
             value = got[f"tug_{part.kind}_s"]
             assert value is not None, (patient, part.kind)
             errors[part.kind].append(value - (part.end_s - part.start_s))
         total = got["tug_duration_s"]
         assert total is not None, patient
-        errors["total"].append(total - made.truth.duration_s)
+        errors["total"].append(total - simulation.truth.duration_s)
     return {name: tuple(values) for name, values in errors.items()}
 
 
 def test_timed_up_and_go_of_twelve_people() -> None:
     rows, worst, worst_total = [], 0.0, 0.0
     for segment in WORN:
-        found = {patient: tug_errors(segment, patient) for patient in PATIENTS}
+        by_patient = {patient: tug_errors(segment, patient) for patient in PATIENTS}
         for name in (*PARTS, "total"):
-            all_of = np.array([e for errors in found.values() for e in errors[name]])
+            all_of = np.array([e for errors in by_patient.values() for e in errors[name]])
             rows.append(
                 (segment, name, *(f"{x:+.3f}" for x in (all_of.mean(), all_of.std(), _largest(all_of))))
             )
@@ -86,36 +86,44 @@ def test_timed_up_and_go_of_twelve_people() -> None:
 )
 def test_a_real_person_sits_down_and_rises(place: str, segment: Segment) -> None:
     """qmt_fullbody: down at 44 to 52 s of its clock, up at 79 to 95 s; bows are neither."""
-    found = find_changes(follow_trunk(take(((segment, place),))))
-    down, rise = found
+    changes = find_changes(follow_trunk(take(((segment, place),))))
+    down, rise = changes
     assert (down.kind, rise.kind) == ("stand_to_sit", "sit_to_stand")
     assert 44.0 <= CLOCK_S + down.start_s < CLOCK_S + down.end_s <= 52.0
     assert 79.0 <= CLOCK_S + rise.start_s < CLOCK_S + rise.end_s <= 95.0
 
 
 def test_turns_of_daily_life() -> None:
-    """mobgap_lowback, two minutes of daily life: every turn of 45° that the cameras saw, none too many.
+    """mobgap_lowback, two minutes of daily life: every turn of 45° seen by the cameras, no extras.
 
-    The cameras see a turn only in their walks and cut what goes beyond; of whole ones the angle counts.
+    Cameras see turns only within their walks and may truncate them; angles are compared for complete ones.
     """
     motion = follow_trunk(uniform(("Test11", "Trial1")))
-    found = find_turns(motion.yaw_rate, motion.valid, motion.rate_hz)
+    turns = find_turns(motion.yaw_rate, motion.valid, motion.rate_hz)
     walks, reference = turns_of(("Test11", "Trial1"))
-    seen = [t for t in reference if abs(t.angle_deg) >= 45.0]
+    observations = [t for t in reference if abs(t.angle_deg) >= 45.0]
     off = []
-    for turn in seen:
-        same = [f for f in found if f.start_s < turn.end_s and turn.start_s < f.end_s]
+    for turn in observations:
+        same = [f for f in turns if f.start_s < turn.end_s and turn.start_s < f.end_s]
         same = [f for f in same if f.angle_rad * turn.angle_deg > 0.0]
         assert len(same) == 1, turn
         if turn.whole:
             off.append(float(np.degrees(abs(same[0].angle_rad))) - abs(turn.angle_deg))
-    inside = [f for f in found if any(a <= f.start_s and f.end_s <= b for a, b in walks)]
+    inside = [f for f in turns if any(a <= f.start_s and f.end_s <= b for a, b in walks)]
     matched = [f for f in inside if any(t.start_s < f.end_s and f.start_s < t.end_s for t in reference)]
     assert len(matched) == len(inside)
     record(
         "Turns of mobgap_lowback",
         ("turns of 45° and more", "found", "too many", "angle, median of the difference °", "largest °"),
-        [(str(len(seen)), str(len(seen)), "0", f"{np.median(off):+.0f}", f"{_largest(np.array(off)):+.0f}")],
+        [
+            (
+                str(len(observations)),
+                str(len(observations)),
+                "0",
+                f"{np.median(off):+.0f}",
+                f"{_largest(np.array(off)):+.0f}",
+            )
+        ],
         "One older adult, two minutes of daily life; the reference is stereophotogrammetry inside its walks. "
         "Angles of turns that it saw whole. INDIP, the other reference, has five turns where it has nine.",
     )
@@ -132,7 +140,7 @@ def test_ten_metres_of_a_real_lane(walk: str) -> None:
 
 
 def test_real_standing_is_measured_or_withheld() -> None:
-    """neura_walk stands for 11 s: too short; with a shorter limit its figures are those of a body."""
+    """neura_walk has 11 s of standing, too short; with a shorter limit its values are plausible."""
     pelvis = neura_walk().sensors["pelvis"]
     standing = replace(neura_walk(), sensors={"pelvis": pelvis})
     assert {p.reason for p in measure_sway(standing).parameters} == {"standing_too_short"}
@@ -153,14 +161,14 @@ def test_guided_tests_give_the_figures_of_the_file() -> None:
     apart: dict[str, list[float]] = {name: [] for name in names}
     late = []
     for patient in PATIENTS:
-        made = simulate_tug(patient, SEEDS[0], setup=replace(ON_SKIN, worn=("pelvis",)))
-        whole = synchronise(made.recording)
+        simulation = simulate_tug(patient, SEEDS[0], setup=replace(ON_SKIN, worn=("pelvis",)))
+        whole = synchronise(simulation.recording)
         file = measure_tug(follow_trunk(whole))
-        *_, shown, last = followed(whole, "tug")
+        *_, visible_rows, last = followed(whole, "tug")
         assert last.final, patient
         assert last.result is not None
         assert file.end_s is not None
-        late.append(shown.t_s - file.end_s)
+        late.append(visible_rows.t_s - file.end_s)
         got, want = ({p.name: p.mean for p in x.parameters} for x in (last.result, file))
         for name in names:
             live, offline = got[name], want[name]

@@ -1,4 +1,4 @@
-"""The published orientation filters on eight trials of BROAD, with vqf beside them."""
+"""Published orientation filters on eight trials of BROAD, compared with vqf."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def trials() -> tuple[ReferenceTrial, ...]:
 
 @cache
 def score(name: str, trial: str, with_bias: bool) -> OrientationScore:
-    found = next(t for t in trials() if t.name == trial)
-    return score_orientation(run_trial(name, found, with_bias=with_bias), found)
+    item = next(t for t in trials() if t.name == trial)
+    return score_orientation(run_trial(name, item, with_bias=with_bias), item)
 
 
 @cache
@@ -63,12 +63,12 @@ def run_ahrs(trial: ReferenceTrial) -> Floats:
     """Madgwick's filter of the library ahrs (its x is north, its y west), from our start."""
     ahrs = pytest.importorskip("ahrs")
     quarter = np.array([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
-    rest = find_rest(trial)
+    remainder = find_rest(trial)
     # sample by sample: over an array it starts from the first sample, in another frame
     run = ahrs.filters.Madgwick(frequency=trial.rate_hz, gain=AHRS_GAIN)
     q = np.empty_like(trial.reference)
-    last = multiply(quarter * [1, 1, 1, -1], rest.find_start()[0][0])
-    for k, sample in enumerate(zip(trial.gyr - rest.gyr, trial.acc, trial.mag, strict=True)):
+    last = multiply(quarter * [1, 1, 1, -1], remainder.find_start()[0][0])
+    for k, sample in enumerate(zip(trial.gyr - remainder.gyr, trial.acc, trial.mag, strict=True)):
         q[k] = last = run.updateMARG(last, *sample)
     return np.asarray(multiply(quarter, q))
 
@@ -84,10 +84,10 @@ def mean_deg(name: str, with_bias: bool = False) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS, ids=lambda a: a.name)
 def test_the_slow_trial_is_within_its_limits(algorithm: Algorithm) -> None:
-    found = score(algorithm.name, SLOW, False)
-    assert math.degrees(found.inclination) < INCLINATION_DEG.get(algorithm.name, 1.5)
+    result = score(algorithm.name, SLOW, False)
+    assert math.degrees(result.inclination) < INCLINATION_DEG.get(algorithm.name, 1.5)
     if algorithm.magnetometer != "unused":
-        assert math.degrees(found.total) < TOTAL_DEG.get(algorithm.name, 3.0)
+        assert math.degrees(result.total) < TOTAL_DEG.get(algorithm.name, 3.0)
 
 
 def test_the_robust_filter_near_a_magnet() -> None:
@@ -119,10 +119,10 @@ def test_every_algorithm_on_every_trial() -> None:
                 *(_pair(tuple(math.degrees(x) for x in astuple(s)), has_heading) for s in each),
             ]
         )
-    found = {t.name: vqf.VQF(1.0 / t.rate_hz).updateBatch(t.gyr, t.acc, t.mag) for t in trials()}
+    by_name = {t.name: vqf.VQF(1.0 / t.rate_hz).updateBatch(t.gyr, t.acc, t.mag) for t in trials()}
     theirs = {
-        "vqf (library), nine axes": [score_orientation(found[t.name]["quat9D"], t) for t in trials()],
-        "vqf (library), six axes": [score_orientation(found[t.name]["quat6D"], t) for t in trials()],
+        "vqf (library), nine axes": [score_orientation(by_name[t.name]["quat9D"], t) for t in trials()],
+        "vqf (library), six axes": [score_orientation(by_name[t.name]["quat6D"], t) for t in trials()],
         "ahrs (library), Madgwick": [score_orientation(run_ahrs(t), t) for t in trials()],
     } | {
         own.label: [score_orientation(run_own(t, both_ways=own.both_ways), t) for t in trials()]

@@ -38,8 +38,8 @@ def taken(copy: str, method: Method) -> tuple[Calibration, dict[str, Floats]]:
     recording = read_recording([SourceFile(path.name, path.stat().st_size, path.read_bytes)], manifest)
     calibrated = calibrate(synchronise(recording), CalibrationParams(method=method))
     toe = np.array([1.0, 0.0, 0.0])
-    found = estimate_orientations(calibrated)
-    return calibrated.calibration, {s: rotate(q, toe)[:, 2] for s, q in found.q.items()}
+    orientations = estimate_orientations(calibrated)
+    return calibrated.calibration, {s: rotate(q, toe)[:, 2] for s, q in orientations.q.items()}
 
 
 @pytest.mark.parametrize("method", ["walking_direction", "gyro_pca"])
@@ -50,7 +50,7 @@ def test_both_copies_give_the_same_foot_pitch(method: Method) -> None:
 
 
 def test_rest_at_the_end_is_used_and_forward_is_the_toe() -> None:
-    """The aligned copy is in a frame with x to the toe: our anterior axis must lie near it."""
+    """The aligned copy has x towards the toe: our anterior axis must agree."""
     calibration, _ = taken(COPIES[0], "walking_direction")
     assert calibration.zero[0] > 36.0
     for mounted in calibration.segments.values():

@@ -1,11 +1,10 @@
 """Stride lengths of single feet on gaitmap_foot against motion capture, limits of
 docs/science/real-recordings.md, "Limits".
 
-The recording begins in motion and rests only at its end: the filter starts mid-walk with wide uncertainty,
-and the gyroscope biases are those of the rest at the end. Nothing was fitted here; the impact rule and the
-filter's noise were found on this recording and on neura_walk (docs/science/erkf.md, "Parameters"): the
-figures say what is reached, not what to expect of others. A stride is the horizontal way of the sensor from
-one stance to the next.
+The recording starts in motion and rests only at its end: the filter starts mid-walk with wide uncertainty and
+gyroscope biases from that rest. Impact rule and noise were chosen on this recording and on neura_walk
+(docs/science/erkf.md, "Parameters"), so results show what is achievable here. A stride is the horizontal
+displacement of the sensor from stance to stance.
 """
 
 from __future__ import annotations
@@ -59,12 +58,12 @@ class Found:
 
 def errors(p: Floats, side: Side, rate_hz: float) -> Found:
     """Found minus true stride lengths of a path (n, 3) in m."""
-    found: tuple[list[float], list[float]] = [], []
+    result: tuple[list[float], list[float]] = [], []
     for stride in true_strides(side):
         a, b = (min(round(t * rate_hz), len(p) - 1) for t in (stride.start_s, stride.end_s))
         length = float(np.linalg.norm((p[b] - p[a])[:2]))
-        found[stride.turning].append(1000 * (length - stride.length_m))
-    return Found(np.array(found[False]), np.array(found[True]))
+        result[stride.turning].append(1000 * (length - stride.length_m))
+    return Found(np.array(result[False]), np.array(result[True]))
 
 
 @cache
@@ -83,8 +82,8 @@ def run(
     return run_erkf(calibrated, orientations, BODY, (FOOT[side],), replace(OFFLINE, impact=impact))
 
 
-def refused_share(of: ErkfRun) -> float:
-    return float(of.track.refused.sum() / of.inputs.contact.sum())
+def refused_share(source: ErkfRun) -> float:
+    return float(source.track.refused.sum() / source.inputs.contact.sum())
 
 
 @cache
@@ -122,14 +121,14 @@ def naive(side: Side, dedrift: bool) -> Floats:
 
 @pytest.mark.parametrize("side", SIDES)
 def test_straight_strides_agree_with_motion_capture(side: Side) -> None:
-    made = run(side)
-    e = errors(made.track.p[:, 0], side, RATE).straight
+    result = run(side)
+    e = errors(result.track.p[:, 0], side, RATE).straight
     assert len(e) >= 26
     assert abs(e.mean()) <= 8.0
     assert e.std() <= 18.0
     assert np.abs(e).max() <= 60.0
-    assert refused_share(made) < 0.02
-    assert abs(made.track.p[-1, 0, 2] - made.track.p[0, 0, 2]) <= 0.30
+    assert refused_share(result) < 0.02
+    assert abs(result.track.p[-1, 0, 2] - result.track.p[0, 0, 2]) <= 0.30
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -146,17 +145,16 @@ def test_the_filter_alone_is_good_enough_to_watch(side: Side, name: str) -> None
 
 @pytest.mark.parametrize("side", SIDES)
 def test_without_the_impact_rule_the_gate_locks_out(side: Side) -> None:
-    """What docs/science/erkf.md, "Impacts" says of constant noise: refusals at every stance, strides ± 40
-    mm."""
-    made = run(side, impact=0.0)
-    assert refused_share(made) > 0.1
-    assert errors(made.track.p[:, 0], side, RATE).straight.std() > 40.0
+    """docs/science/erkf.md, "Impacts": with constant noise, refusals at every stance and strides ± 40 mm."""
+    result = run(side, impact=0.0)
+    assert refused_share(result) > 0.1
+    assert errors(result.track.p[:, 0], side, RATE).straight.std() > 40.0
 
 
 @pytest.mark.parametrize("side", SIDES)
 def test_how_the_sensor_is_turned_on_the_shoe_does_not_matter(side: Side) -> None:
-    one, other = (errors(run(side, copy).track.p[:, 0], side, RATE).straight for copy in COPIES)
-    np.testing.assert_allclose(one, other, atol=0.5)
+    one, second = (errors(run(side, copy).track.p[:, 0], side, RATE).straight for copy in COPIES)
+    np.testing.assert_allclose(one, second, atol=0.5)
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -178,15 +176,15 @@ def reported(side: Side) -> tuple[Floats, Floats]:
     assert analysis.strides is not None
     figures = measure_distances(analysis.strides, analysis.feet)
     columns = (figures[name].values for name in ("stride_length_m", "gait_speed_mps"))
-    found = []
+    result = []
     for stride, length, speed in zip(analysis.strides.strides, *columns, strict=True):
         for true in true_strides(side):
             same = abs(stride.start_s - true.first_ic_s) < 0.05 and abs(stride.end_s - true.last_ic_s) < 0.05
             if stride.side == side and stride.excluded_reason is None and same:
                 assert np.isfinite([length, speed]).all()
                 true_speed = true.length_m / (true.last_ic_s - true.first_ic_s)
-                found.append((1000 * (length - true.length_m), 1000 * (speed - true_speed)))
-    return np.array(found).T[0], np.array(found).T[1]
+                result.append((1000 * (length - true.length_m), 1000 * (speed - true_speed)))
+    return np.array(result).T[0], np.array(result).T[1]
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -209,13 +207,13 @@ def test_the_filter_beats_plain_integration_on_both_feet() -> None:
 def test_write_down_the_figures() -> None:
     rows, turns, speed, short, plain = [], [], [], [], []
     for side in SIDES:
-        made, half, constant = run(side), run(side, half_rate=True), run(side, impact=0.0)
+        process, half, constant = run(side), run(side, half_rate=True), run(side, impact=0.0)
         feet = analysed().feet
         assert feet is not None
         unknown = replace(OFFLINE, start_gyr_bias_sd=OFFLINE.moving_gyr_bias_sd)
         biased = run_erkf(*take(), BODY, (FOOT[side],), unknown)
         paths: list[tuple[str, Floats, float, ErkfRun | None]] = [
-            ("ErKF 15 states + smoother", made.track.p[:, 0], RATE, made),
+            ("ErKF 15 states + smoother", process.track.p[:, 0], RATE, process),
             ("the same through the product, ankle", feet.p[side], RATE, None),
             ("the same, 102.4 Hz block mean", half.track.p[:, 0], RATE / 2, half),
             ("filter only, live set (9 states)", live(side, "live").p[:, 0], RATE, None),
@@ -225,24 +223,24 @@ def test_write_down_the_figures() -> None:
             ("plain integration between stances", naive(side, False), RATE, None),
             ("plain integration, linear de-drift", naive(side, True), RATE, None),
         ]
-        for name, p, rate, of in paths:
-            found = errors(p, side, rate)
-            told = ["", ""]
-            if of is not None:
-                height = of.track.p[-1, 0, 2] - of.track.p[0, 0, 2]
-                told = [f"{100 * refused_share(of):.1f}", f"{height:+.2f}"]
-            rows.append([side, name, *found.row, *told])
+        for name, p, rate, owner in paths:
+            result = errors(p, side, rate)
+            notices = ["", ""]
+            if owner is not None:
+                height = owner.track.p[-1, 0, 2] - owner.track.p[0, 0, 2]
+                notices = [f"{100 * refused_share(owner):.1f}", f"{height:+.2f}"]
+            rows.append([side, name, *result.row, *notices])
         lengths, speeds = reported(side)
-        told = [
+        notices = [
             str(len(lengths)),
             f"{lengths.mean():+.1f} ± {lengths.std():.1f}",
             f"{np.abs(lengths).max():.0f}",
         ]
-        rows.append([side, "the report's counted strides", *told, "", ""])
+        rows.append([side, "the report's counted strides", *notices, "", ""])
         short.append(f"{side} {lengths.mean():+.1f} ± {lengths.std():.1f} (n={len(lengths)})")
         plain.append(f"{side} {rows[-2][3]}")
         speed.append(f"{side} {speeds.mean():+.0f} ± {speeds.std():.0f}")
-        path = errors(made.track.p[:, 0], side, RATE).turning
+        path = errors(process.track.p[:, 0], side, RATE).turning
         turns.append(f"{side} " + ", ".join(f"{x:+.0f}" for x in path))
     record_in_short(
         "Stride length mm",

@@ -1,9 +1,8 @@
-"""What turning forward axes by the joints gains and costs, on simulated walks with exact truth.
+"""Gain and cost of refining anterior axes by the joints, on simulated walks with exact truth.
 
-Sensors on skin with MEMS errors, nominal places, calibration by the product. Angles against the truth's own
-standing-zeroed ones while walking. The joints' view of a heading is itself 1 to 3° off, as soft tissue turns
-sensors and nobody knows where exactly they sit: a good calibration gains nothing by it and may lose half a
-degree of knee adduction; a wrong one is repaired.
+Sensors on skin with MEMS errors, nominal positions, calibration by the product. Angles against the truth's
+standing-zeroed ones in walking. Joint headings are themselves 1 to 3° off (soft tissue, unknown positions): a
+good calibration gains nothing and may lose half a degree of knee adduction; a wrong one is corrected.
 """
 
 from __future__ import annotations
@@ -45,8 +44,8 @@ def errors(walk: tuple[str, int], wrong: str, agree: bool) -> dict[str, float]:
     """RMS error of each angle while walking, degrees, the worse side."""
     recording, truth = simulated(*walk)
     calibrated = calibrate(recording)
-    by = {s: radians(x) for s, x in WRONG[wrong].items()}
-    calibrated, orientations = turn_forward_axes(calibrated, estimate_orientations(calibrated), by)
+    by_key = {s: radians(x) for s, x in WRONG[wrong].items()}
+    calibrated, orientations = turn_forward_axes(calibrated, estimate_orientations(calibrated), by_key)
     body, _ = nominal_body(recording.subject.height_m)
     whole, params = PRESETS["lower_body7"], ErkfParams.offline()
     if agree:
@@ -85,8 +84,8 @@ def test_write_down_the_figures() -> None:
     rows = []
     for wrong in CASES:
         for agree in (False, True):
-            found = [errors(walk, wrong, agree) for walk in WALKS]
-            worst = [max(f[n] for f in found) for n in ANGLES]
+            result = [errors(walk, wrong, agree) for walk in WALKS]
+            worst = [max(f[n] for f in result) for n in ANGLES]
             rows.append([wrong, "turned by the joints" if agree else "left so", *(f"{x:.1f}" for x in worst)])
     record(
         "Forward axes on simulated walks",

@@ -1,6 +1,6 @@
-"""The headline of the twelve virtual people names what was commanded, and of the healthy one nothing.
+"""The headline of the twelve virtual people names the commanded deviation, and none for the healthy one.
 
-Every run has half of them; all are run with `--write-figures`.
+Each run covers half of them; `--write-figures` runs all.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ def headline_of(name: str) -> Headline:
 @pytest.mark.parametrize("name", sample(sorted(PATIENTS), 2))
 def test_the_headline_names_the_signature(name: str) -> None:
     headline = headline_of(name)
-    told = [s.text for s in headline.shown]
+    texts = [s.text for s in headline.shown]
     for part in SIGNATURES[name]:
-        assert any(re.search(part, text) for text in told), told
+        assert any(re.search(part, text) for text in texts), texts
     if name == "healthy":
         assert headline.stands_out == ()
         assert headline.looked_at >= 10

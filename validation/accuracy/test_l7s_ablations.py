@@ -58,17 +58,17 @@ CASES: Final[dict[str, tuple[int, type[Textbook] | None, bool]]] = {
 """Name → projections, form, ankle on the other side of the foot's middle."""
 
 
-def poses_of(of: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
+def poses_of(source: Trial, R: Floats, p: Floats, model: LegModel) -> Poses:
     """What `l7s_poses` makes of a track, without its diagnostics."""
     legs, n = solve_legs(R, p, model), len(p)
     return Poses(
-        t_s=of.orientations.t_s,
+        t_s=source.orientations.t_s,
         rate_hz=RATE,
         q={s: legs.q[:, i] for i, s in enumerate(FIGURE)},
         p={s: legs.p[:, i] for i, s in enumerate(FIGURE)},
         valid=np.ones(n, bool),
-        contact={FOOT[s]: of.steps[s] for s in SIDES},
-        body=of.truth.body,
+        contact={FOOT[s]: source.steps[s] for s in SIDES},
+        body=source.truth.body,
         method="l7s_3i",
     )
 
@@ -78,9 +78,9 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
     """RMSE without offset and correlation (3, 2) of hip, knee, ankle flexion over the whole walk."""
     projections, form, flipped = CASES[name]
     params = L7sParams(adjoint=adjoint, projections=projections)
-    of = trial("walk", 1.70, 2)
-    model = LegModel.of(of.truth.body)
-    inputs = take_of(of.orientations, of.acceleration, of.steps, model, "3I").part(slice(None))
+    owner = trial("walk", 1.70, 2)
+    model = LegModel.of(owner.truth.body)
+    inputs = take_of(owner.orientations, owner.acceleration, owner.steps, model, "3I").part(slice(None))
     # the ankle at +d/2 is a middle of the foot that lies behind the ankle
     used = replace(model, foot=-model.foot) if flipped else model
     if form is None:
@@ -88,11 +88,11 @@ def scored(name: str, adjoint: Adjoint) -> Floats:
         p, R = track.p, track.R
     else:
         p, R = textbook(inputs, used, params, RATE, form)
-    return trial_scores(of, poses_of(of, R, p, used))
+    return trial_scores(owner, poses_of(owner, R, p, used))
 
 
 def test_each_departure_from_print_pays_on_a_simulated_walk() -> None:
-    """Factors of the mean RMSE of the three joints, with the printed adjoint: half of what was reached."""
+    """Factors of the mean RMSE of the three joints, with the printed adjoint: half of those reached."""
     ours = scored("ours", "printed")[:, 0].mean()
     for name, factor in (
         ("no constraints", 1.2),
@@ -105,8 +105,8 @@ def test_each_departure_from_print_pays_on_a_simulated_walk() -> None:
 
 
 def test_a_second_projection_changes_no_angle() -> None:
-    once, twice = (scored(n, "printed") for n in ("one projection, as in the paper", "ours"))
-    np.testing.assert_allclose(once, twice, atol=0.1)
+    single, twice = (scored(n, "printed") for n in ("one projection, as in the paper", "ours"))
+    np.testing.assert_allclose(single, twice, atol=0.1)
 
 
 @whole_only

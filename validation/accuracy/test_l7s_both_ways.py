@@ -76,10 +76,10 @@ class Take:
 
 
 def in_part(n: int, *spans: tuple[float, float]) -> Bools:
-    found = np.zeros(n, bool)
+    buffer = np.zeros(n, bool)
     for a, b in spans:
-        found[round(a * 100) : round(b * 100)] = True
-    return found
+        buffer[round(a * 100) : round(b * 100)] = True
+    return buffer
 
 
 @cache
@@ -95,8 +95,8 @@ def take(name: str) -> Take:
     if name == "qmt_fullbody":
         calibrated = calibrate(qmt_take(QMT_NAMES))
         orientations = estimate_orientations(calibrated)
-        made = chain(calibrated, orientations)
-        angles = measure_angles(made.orientations, made.calibrated.calibration.zero).angles
+        result = chain(calibrated, orientations)
+        angles = measure_angles(result.orientations, result.calibrated.calibration.zero).angles
         n = len(orientations.t_s)
         rests = {s: np.flatnonzero(np.diff(x.astype(int)) == 1) for s, x in steps_of(calibrated).items()}
         cycles = tuple(
@@ -129,58 +129,61 @@ def simulated_take(recording: UniformRecording, walked: WalkTruth) -> Take:
 
 
 def estimate(
-    of: Take, worn: Worn, *, both_ways: bool, body: BodyModel | None = None
+    source: Take, segments: Worn, *, both_ways: bool, body: BodyModel | None = None
 ) -> tuple[dict[str, Floats], float]:
     """Angles in degrees from standing, and the share of the motion with a knee at its bound."""
     poses = l7s_poses(
-        of.orientations,
-        free_acceleration(of.calibrated, of.orientations),
-        steps_of(of.calibrated),
-        body or of.body,
-        worn=worn,
+        source.orientations,
+        free_acceleration(source.calibrated, source.orientations),
+        steps_of(source.calibrated),
+        body or source.body,
+        configuration=segments,
         both_ways=both_ways,
     )
     q = dict(poses.q)
     posed = Orientations(poses.t_s, poses.rate_hz, q, dict.fromkeys(q, np.ones_like(poses.valid)), "")
-    angles = measure_angles(posed, of.calibrated.calibration.zero).angles
+    angles = measure_angles(posed, source.calibrated.calibration.zero).angles
     shares = poses.diagnostics["knee_straight_share"]
     assert isinstance(shares, dict)
     return {n: np.degrees(x) for n, x in angles.items()}, float(np.mean(list(shares.values())))
 
 
 @cache
-def estimated(name: str, worn: Worn, both_ways: bool) -> tuple[dict[str, Floats], float]:
-    return estimate(take(name), worn, both_ways=both_ways)
+def estimated(name: str, segments: Worn, both_ways: bool) -> tuple[dict[str, Floats], float]:
+    return estimate(take(name), segments, both_ways=both_ways)
 
 
-def spreads(of: Take, found: dict[str, Floats], name: str) -> Floats:
+def spreads(source: Take, result: dict[str, Floats], name: str) -> Floats:
     """SD of the error (3,) of hip, knee and ankle over the walk, mean of the sides."""
     if name == "neura_walk":
-        _, against = scores(found)
+        _, against = scores(result)
         return np.array([np.mean([against[f"{a}_{e}"].offset_removed for e in "lr"]) for a in FLEXION])
     return np.array(
-        [np.mean([(found[f"{a}_{e}"] - of.truth[f"{a}_{e}"])[of.part].std() for e in "lr"]) for a in FLEXION]
+        [
+            np.mean([(result[f"{a}_{e}"] - source.truth[f"{a}_{e}"])[source.part].std() for e in "lr"])
+            for a in FLEXION
+        ]
     )
 
 
 @cache
-def spread(name: str, worn: Worn, both_ways: bool) -> Floats:
-    return spreads(take(name), estimated(name, worn, both_ways)[0], name)
+def spread(name: str, segments: Worn, both_ways: bool) -> Floats:
+    return spreads(take(name), estimated(name, segments, both_ways)[0], name)
 
 
-def figures(of: Take, angles: dict[str, Floats]) -> Floats:
+def figures(source: Take, angles: dict[str, Floats]) -> Floats:
     """Maximum, minimum, range, contact and mean (5, 3) of straight strides, mean over strides and sides."""
-    found = []
-    for side, a, b in of.cycles:
+    result = []
+    for side, a, b in source.cycles:
         curves = [angles[f"{n}_{SUFFIX[side]}"][a:b] for n in FLEXION]
-        found.append([[x.max(), x.min(), np.ptp(x), x[0], x.mean()] for x in curves])
-    return np.asarray(np.mean(found, axis=0).T)
+        result.append([[x.max(), x.min(), np.ptp(x), x[0], x.mean()] for x in curves])
+    return np.asarray(np.mean(result, axis=0).T)
 
 
 @cache
-def figure_errors(name: str, worn: Worn) -> Floats:
-    of = take(name)
-    return figures(of, estimated(name, worn, True)[0]) - figures(of, of.truth)
+def figure_errors(name: str, segments: Worn) -> Floats:
+    owner = take(name)
+    return figures(owner, estimated(name, segments, True)[0]) - figures(owner, owner.truth)
 
 
 @pytest.mark.parametrize("worn", get_args(Worn))
@@ -193,8 +196,8 @@ def test_flexion_on_the_real_walk_is_as_good_as_asked(worn: Worn) -> None:
 def test_both_ways_is_better_on_people_it_was_not_made_on(worn: Worn) -> None:
     for person in PEOPLE:
         assert (spread(person, worn, True) < PEOPLE_LIMIT[worn]).all(), person
-    both, before = (np.mean([spread(p, worn, x) for p in PEOPLE], axis=0) for x in (True, False))
-    assert (both < before - 1.0 if worn == "3I" else both < before).all()
+    pair, initial = (np.mean([spread(p, worn, x) for p in PEOPLE], axis=0) for x in (True, False))
+    assert (pair < initial - 1.0 if worn == "3I" else pair < initial).all()
 
 
 @pytest.mark.parametrize("worn", get_args(Worn))
@@ -215,16 +218,16 @@ def test_what_is_stated_of_levels_and_ranges_is_what_they_are_known_to(worn: Wor
 def test_a_wrong_height_does_not_matter_and_a_lost_foot_is_found_again() -> None:
     name: Final = "neura_walk"
     for height in (1.55, 1.85):
-        found, _ = estimate(take(name), "3I", both_ways=True, body=BodyModel.from_height(height))
-        assert (spreads(take(name), found, name) < spread(name, "3I", True) + 1.2).all()
+        result, _ = estimate(take(name), "3I", both_ways=True, body=BodyModel.from_height(height))
+        assert (spreads(take(name), result, name) < spread(name, "3I", True) + 1.2).all()
     recording, walked = simulated("comfortable", 2)
     whole = estimate(simulated_take(recording, walked), "3I", both_ways=True)[0]
     for start_s in (16.0, 16.3, 16.6):
         gone = simulated_take(lost(recording, "foot_r", start_s, start_s + 0.5), walked)
-        found, _ = estimate(gone, "3I", both_ways=True)
-        after = slice(round((start_s + 2.4) * 100), round((start_s + 12.4) * 100))
+        result, _ = estimate(gone, "3I", both_ways=True)
+        final_window = slice(round((start_s + 2.4) * 100), round((start_s + 12.4) * 100))
         for angle in (f"{n}_{e}" for n in FLEXION for e in "lr"):
-            assert np.abs(found[angle] - whole[angle])[after].max() < 20.0
+            assert np.abs(result[angle] - whole[angle])[final_window].max() < 20.0
 
 
 @cache
@@ -250,65 +253,65 @@ def knee_from(reach: Floats, thigh: float, shank: float) -> Floats:
 @cache
 def floor_deg() -> Floats:
     """SD of the error (2,) of the knee from Vicon's reach and lengths: no leg model does better."""
-    found = []
+    result = []
     for side in SIDES:
         thigh, shank = (
             float(np.linalg.norm(vicon(a, side) - vicon(b, side), axis=1)[WALK].mean())
             for a, b in (("HJC", "KJC"), ("KJC", "AJC"))
         )
         error = knee_from(true_reach(side), thigh, shank) - reference()[f"knee_flexion_{SUFFIX[side]}"]
-        found.append(error[WALK].std())
-    return np.array(found)
+        result.append(error[WALK].std())
+    return np.array(result)
 
 
-def reach_errors(worn: Worn, both_ways: bool) -> tuple[Floats, Floats]:
+def reach_errors(segments: Worn, both_ways: bool) -> tuple[Floats, Floats]:
     """Errors of hip to ankle in cm of a walking leg, of its full length: knee below 25°, and above."""
-    of = take("neura_walk")
+    owner = take("neura_walk")
     poses = l7s_poses(
-        of.orientations,
-        free_acceleration(of.calibrated, of.orientations),
-        steps_of(of.calibrated),
-        of.body,
-        worn=worn,
+        owner.orientations,
+        free_acceleration(owner.calibrated, owner.orientations),
+        steps_of(owner.calibrated),
+        owner.body,
+        configuration=segments,
         both_ways=both_ways,
     )
     near, bent = [], []
     for side in SIDES:
-        found = np.linalg.norm(poses.p[THIGH[side]] - poses.p[FOOT[side]], axis=1)
+        norm = np.linalg.norm(poses.p[THIGH[side]] - poses.p[FOOT[side]], axis=1)
         full = np.percentile(true_reach(side)[WALK], 98)
-        error = 100.0 * (found - (BODY.thigh + BODY.shank) / full * true_reach(side)[: len(found)])
-        straight = reference()[f"knee_flexion_{SUFFIX[side]}"][: len(found)] < 25.0
+        error = 100.0 * (norm - (BODY.thigh + BODY.shank) / full * true_reach(side)[: len(norm)])
+        straight = reference()[f"knee_flexion_{SUFFIX[side]}"][: len(norm)] < 25.0
         near.append(error[WALK][straight[WALK]])
         bent.append(error[WALK][~straight[WALK]])
     return np.concatenate(near), np.concatenate(bent)
 
 
-def per_stride(worn: Worn, both_ways: bool) -> Floats:
+def per_stride(segments: Worn, both_ways: bool) -> Floats:
     """SD of the error (3,) within each straight stride of neura_walk, mean of all: the paper's measure."""
-    of, (found, _) = take("neura_walk"), estimated("neura_walk", worn, both_ways)
-    lag, _ = scores(found)
+    owner, (result, _) = take("neura_walk"), estimated("neura_walk", segments, both_ways)
+    lag, _ = scores(result)
     rows = []
-    for side, a, b in of.cycles:
+    for side, a, b in owner.cycles:
         names = [f"{n}_{SUFFIX[side]}" for n in FLEXION]
-        rows.append([(np.roll(found[n], -lag) - of.truth[n])[a:b].std() for n in names])
+        rows.append([(np.roll(result[n], -lag) - owner.truth[n])[a:b].std() for n in names])
     return np.asarray(np.mean(rows, axis=0))
 
 
 def test_the_knee_is_near_what_a_legs_length_can_tell() -> None:
     assert (floor_deg() > 4.5).all()
     assert spread("neura_walk", "3I", True)[1] < floor_deg().mean() + 2.0
-    before, after = (np.mean(np.abs(np.concatenate(reach_errors("3I", x)))) for x in (False, True))
-    assert after < 0.6 * before
+    initial, final = (np.mean(np.abs(np.concatenate(reach_errors("3I", x)))) for x in (False, True))
+    assert final < 0.6 * initial
 
 
 def test_write_down_what_bounds_it() -> None:
     rows = []
-    for worn in get_args(Worn):
+    for segments in get_args(Worn):
         for both_ways in (False, True):
-            cells = [f"{x.mean():+.1f} ± {x.std():.1f}" for x in reach_errors(worn, both_ways)]
-            steps = " / ".join(f"{x:.1f}" for x in per_stride(worn, both_ways))
-            knee = f"{spread('neura_walk', worn, both_ways)[1]:.1f}"
-            rows.append([WORN[worn], "both ways" if both_ways else "filter", *cells, knee, steps])
+            cells = [f"{x.mean():+.1f} ± {x.std():.1f}" for x in reach_errors(segments, both_ways)]
+            steps = " / ".join(f"{x:.1f}" for x in per_stride(segments, both_ways))
+            knee = f"{spread('neura_walk', segments, both_ways)[1]:.1f}"
+            rows.append([WORN[segments], "both ways" if both_ways else "filter", *cells, knee, steps])
     floor = "Vicon's reach, Vicon's lengths"
     rows.append([floor, "law of cosines", "0", "0", f"{floor_deg().mean():.1f}", "–"])
     rows.append(["Sy 2021 Table V, pelvis and feet", "filter", "–", "–", "–", "5.0 / 8.2 / 5.9"])
@@ -329,11 +332,11 @@ def test_write_down_what_bounds_it() -> None:
 def test_write_down_the_figures() -> None:
     rows: list[list[str]] = []
     for name in TAKES:
-        for worn in get_args(Worn):
-            cells = [name, WORN[worn]]
+        for segments in get_args(Worn):
+            cells = [name, WORN[segments]]
             for both_ways in (False, True):
-                cells.append(" / ".join(f"{x:.1f}" for x in spread(name, worn, both_ways)))
-                cells.append(f"{100.0 * estimated(name, worn, both_ways)[1]:.0f}")
+                cells.append(" / ".join(f"{x:.1f}" for x in spread(name, segments, both_ways)))
+                cells.append(f"{100.0 * estimated(name, segments, both_ways)[1]:.0f}")
             rows.append(cells)
     record(
         "L7S: both ways",
@@ -350,17 +353,17 @@ def test_write_down_the_figures() -> None:
 
 @whole_only
 def test_write_down_levels_and_ranges() -> None:
-    """RMS over all takes; what is stated of them stands in a test above, for the people of every run."""
+    """RMS over all trials; limits are asserted above for the people of every run."""
     names = ("maximum", "minimum", "range", "at contact", "mean of the stride")
     rows: list[list[str]] = []
-    for worn in get_args(Worn):
-        errors = np.array([figure_errors(name, worn) for name in TAKES])
+    for segments in get_args(Worn):
+        errors = np.array([figure_errors(name, segments) for name in TAKES])
         for k, joint in enumerate(("hip", "knee", "ankle")):
-            own = (ESTIMATED_DEG if worn == "3I" else FEET_ALONE_DEG)[joint]
+            own = (ESTIMATED_DEG if segments == "3I" else FEET_ALONE_DEG)[joint]
             cells = [f"{np.sqrt(np.mean(errors[:, i, k] ** 2)):.1f}" for i in range(len(names))]
             worst = np.unravel_index(np.abs(errors[:, :, k]).argmax(), errors[:, :, k].shape)
             most = f"{errors[worst[0], worst[1], k]:+.0f} ({TAKES[worst[0]]}, {names[worst[1]]})"
-            rows.append([WORN[worn], joint, *cells, most, f"{own:g}"])
+            rows.append([WORN[segments], joint, *cells, most, f"{own:g}"])
     record(
         "L7S: levels and ranges",
         ["sensors", "joint", *names, "largest", "stated"],

@@ -60,19 +60,19 @@ class Step:
 
 def steps(p: Paths, flats: Flats, strides: list[tuple[Side, int, int]], rate_hz: float) -> list[Step]:
     """Figures of strides given by side and flats, by the definitions of core/parameters/spatial.py."""
-    found = []
+    result = []
     for side, first, last in strides:
-        other: Side = "left" if side == "right" else "right"
-        between = flats[other][(flats[other] > first) & (flats[other] < last)]
+        other_side: Side = "left" if side == "right" else "right"
+        gap = flats[other_side][(flats[other_side] > first) & (flats[other_side] < last)]
         along = p[side][last, :2] - p[side][first, :2]
         length = float(np.linalg.norm(along))
         along = along / length
         outward = np.array([-along[1], along[0]]) * (1.0 if side == "left" else -1.0)
-        apart = p[side][last, :2] - p[other][between[-1], :2]
-        found.append(
+        apart = p[side][last, :2] - p[other_side][gap[-1], :2]
+        result.append(
             Step(side, length, float(apart @ along), float(apart @ outward), (last - first) / rate_hz)
         )
-    return found
+    return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +97,13 @@ class Walk:
 def paths(calibrated: CalibratedRecording, orientations: Orientations, body: BodyModel) -> dict[str, Paths]:
     """Feet of L7S-3I, L7S-2I and of each foot's own ErKF, as the product runs them."""
     acceleration, still = free_acceleration(calibrated, orientations), steps_of(calibrated)
-    found: dict[str, Paths] = {}
-    for worn in get_args(Worn):
-        poses = l7s_poses(orientations, acceleration, still, body, worn=worn)
-        found[f"L7S-{worn}"] = {s: poses.p[FOOT[s]] for s in SIDES}
+    result: dict[str, Paths] = {}
+    for segments in get_args(Worn):
+        poses = l7s_poses(orientations, acceleration, still, body, configuration=segments)
+        result[f"L7S-{segments}"] = {s: poses.p[FOOT[s]] for s in SIDES}
     run = run_erkf(calibrated, orientations, body, tuple(FOOT.values()), ErkfParams.people())
-    found[OWN] = foot_tracks(run, replace_orientations(run, orientations), body).p
-    return found
+    result[OWN] = foot_tracks(run, replace_orientations(run, orientations), body).p
+    return result
 
 
 @cache
@@ -116,10 +116,10 @@ def simulated_walk(name: str, seed: int) -> Walk:
     strides: list[tuple[Side, int, int]] = []
     for s in truth.strides:
         if abs(s.turn_rad) < TURNING and s.length_m > 0.7 * typical:
-            at = np.searchsorted(flats[s.side], [100.0 * s.start_s, 100.0 * s.end_s])
-            strides.append((s.side, int(flats[s.side][at[0]]), int(flats[s.side][at[1]])))
-    made = paths(calibrated, estimate_orientations(calibrated), truth.body)
-    return Walk(name, {s: truth.p[FOOT[s]][:n] for s in SIDES}, flats, strides, made)
+            index = np.searchsorted(flats[s.side], [100.0 * s.start_s, 100.0 * s.end_s])
+            strides.append((s.side, int(flats[s.side][index[0]]), int(flats[s.side][index[1]])))
+    result = paths(calibrated, estimate_orientations(calibrated), truth.body)
+    return Walk(name, {s: truth.p[FOOT[s]][:n] for s in SIDES}, flats, strides, result)
 
 
 def _flats(truth: WalkTruth, side: Side, n: int) -> np.ndarray:
@@ -157,7 +157,7 @@ def walks(name: str) -> list[Walk]:
     return [simulated_walk(name, seed) for seed in SEEDS]
 
 
-def pooled(taken: Sequence[Walk], run: str) -> Floats:
+def pooled(selection: Sequence[Walk], run: str) -> Floats:
     """Errors (strides, 4) in m and m/s of stride length, step length, step width, speed."""
     return np.array(
         [
@@ -167,68 +167,70 @@ def pooled(taken: Sequence[Walk], run: str) -> Floats:
                 a.width_m - b.width_m,
                 (a.stride_m - b.stride_m) / b.duration_s,
             ]
-            for walk in taken
+            for walk in selection
             for a, b in walk.errors(run)
         ]
     )
 
 
-def half_strides(taken: Sequence[Walk]) -> Floats:
+def half_strides(selection: Sequence[Walk]) -> Floats:
     """Errors in m of the guess that a step is half of the stride as the foot's own ErKF has it."""
-    return np.array([0.5 * a.stride_m - b.step_m for walk in taken for a, b in walk.errors(OWN)])
+    return np.array([0.5 * a.stride_m - b.step_m for walk in selection for a, b in walk.errors(OWN)])
 
 
-def asymmetries(taken: Sequence[Walk], run: str) -> tuple[Floats, Floats]:
+def asymmetries(selection: Sequence[Walk], run: str) -> tuple[Floats, Floats]:
     """Mean left minus mean right step length in m of every take, found and true."""
-    found = []
-    for walk in taken:
+    result = []
+    for walk in selection:
         pairs = walk.errors(run)
         mean = {s: np.mean([(a.step_m, b.step_m) for a, b in pairs if a.side == s], axis=0) for s in SIDES}
-        found.append(mean["left"] - mean["right"])
-    return np.array(found)[:, 0], np.array(found)[:, 1]
+        result.append(mean["left"] - mean["right"])
+    return np.array(result)[:, 0], np.array(result)[:, 1]
 
 
 @pytest.mark.parametrize("name", WALKS)
 def test_straight_strides_and_speed_of_l7s_are_within_four_centimetres(name: str) -> None:
-    for worn in get_args(Worn):
-        errors = pooled(walks(name), f"L7S-{worn}")
+    for segments in get_args(Worn):
+        errors = pooled(walks(name), f"L7S-{segments}")
         assert np.sqrt(np.mean(errors[:, 0] ** 2)) < 0.04
         assert np.sqrt(np.mean(errors[:, 3] ** 2)) < 0.04
 
 
 def test_a_foots_own_erkf_has_the_better_strides() -> None:
-    for taken in ([w for name in WALKS for w in walks(name)], [neura()]):
-        own = np.sqrt(np.mean(pooled(taken, OWN)[:, 0] ** 2))
-        for worn in get_args(Worn):
-            assert own < np.sqrt(np.mean(pooled(taken, f"L7S-{worn}")[:, 0] ** 2))
+    for selection in ([w for name in WALKS for w in walks(name)], [neura()]):
+        own = np.sqrt(np.mean(pooled(selection, OWN)[:, 0] ** 2))
+        for segments in get_args(Worn):
+            assert own < np.sqrt(np.mean(pooled(selection, f"L7S-{segments}")[:, 0] ** 2))
 
 
 def test_unequal_steps_are_found_in_simulation_by_three_sensors_and_not_on_the_real_walk() -> None:
     """Were the last two ever false, step lengths of three and of two sensors could be given."""
     off = {
-        worn: [found - true for name in WALKS for found, true in [asymmetries(walks(name), f"L7S-{worn}")]]
-        for worn in get_args(Worn)
+        segments: [
+            result - true for name in WALKS for result, true in [asymmetries(walks(name), f"L7S-{segments}")]
+        ]
+        for segments in get_args(Worn)
     }
     assert np.abs(off["3I"]).max() < 0.08
-    found, true = asymmetries([neura()], "L7S-3I")
-    assert np.abs(found - true).max() > 0.04
+    result, true = asymmetries([neura()], "L7S-3I")
+    assert np.abs(result - true).max() > 0.04
     assert np.abs(off["2I"]).max() > 0.1
 
 
 def test_write_down_the_figures() -> None:
     rows = []
-    for taken in [*(walks(name) for name in WALKS), [neura()]]:
-        title = taken[0].name.replace("_", " ") if len(taken) > 1 else taken[0].name
-        true = np.array([[b.stride_m, b.step_m, b.width_m] for w in taken for _, b in w.errors(OWN)])
+    for selection in [*(walks(name) for name in WALKS), [neura()]]:
+        title = selection[0].name.replace("_", " ") if len(selection) > 1 else selection[0].name
+        true = np.array([[b.stride_m, b.step_m, b.width_m] for w in selection for _, b in w.errors(OWN)])
         cells = [f"{100 * x.mean():.0f} ± {100 * x.std():.0f}" for x in true.T]
-        _, really = asymmetries(taken, OWN)
+        _, really = asymmetries(selection, OWN)
         rows.append([f"{title}, n={len(true)}", "true", *cells, "–", _span(really)])
-        for worn in get_args(Worn):
-            errors = pooled(taken, f"L7S-{worn}")
-            found, really = asymmetries(taken, f"L7S-{worn}")
+        for segments in get_args(Worn):
+            errors = pooled(selection, f"L7S-{segments}")
+            result, really = asymmetries(selection, f"L7S-{segments}")
             cells = [f"{100 * e.mean():+.1f} ± {100 * e.std():.1f}" for e in errors.T]
-            rows.append(["", f"L7S-{worn}", *cells, _span(found)])
-        own, half = pooled(taken, OWN), half_strides(taken)
+            rows.append(["", f"L7S-{segments}", *cells, _span(result)])
+        own, half = pooled(selection, OWN), half_strides(selection)
         rows.append(
             [
                 "",

@@ -47,26 +47,26 @@ class Told:
 
 def true_figure(angle: Floats, cycles: list[tuple[int, int]], figure: CurveFigure) -> float:
     """Mean over cycles (first and last sample) of a figure of the angle (n,) in °."""
-    found = []
+    result = []
     for a, b in cycles:
         curve = np.interp(np.linspace(a, b, 101), np.arange(len(angle)), angle)
         part = curve[figure.start_pct : figure.end_pct + 1]
         read = {"at": part[0], "max": part.max(), "min": part.min(), "range": np.ptp(part)}
-        found.append(read[figure.statistic])
-    return float(np.mean(found))
+        result.append(read[figure.statistic])
+    return float(np.mean(result))
 
 
 @cache
-def told(worn: str) -> tuple[Told, ...]:
+def told(segments: str) -> tuple[Told, ...]:
     """All figures of all people."""
-    return tuple(found for name in PEOPLE for found in of_person(name, worn))
+    return tuple(result for name in PEOPLE for result in of_person(name, segments))
 
 
-def of_person(name: str, worn: str) -> Iterator[Told]:
+def of_person(name: str, segment_names: str) -> Iterator[Told]:
     simulated = simulate_scenario(name, SEED)
     recording, truth = simulated.recording, simulated.truth
-    segments = {d: s if s in WORN[worn] else None for d, s in recording.segments.items()}
-    found = analyse(replace(recording, segments=segments))
+    segments = {d: s if s in WORN[segment_names] else None for d, s in recording.segments.items()}
+    analysis = analyse(replace(recording, segments=segments))
     angles = truth.subtract_standing()
     for side in SIDES:
         cycles = [
@@ -74,25 +74,25 @@ def of_person(name: str, worn: str) -> Iterator[Told]:
             for s in truth.strides
             if s.side == side and abs(s.turn_rad) < np.radians(10.0)
         ]
-        by_name = {p.name: p for p in found.parameters if p.side == side}
+        by_name = {p.name: p for p in analysis.parameters if p.side == side}
         for figure, read in FIGURES.items():
             p = by_name[figure]
             true = true_figure(np.degrees(angles[f"{read.variable}_{SUFFIX[side]}"]), cycles, read)
             yield Told(figure, None if p.mean is None else p.mean - true, p.uncertainty, p.reason)
 
 
-def stated(figure: str, worn: str) -> float:
+def stated(figure: str, segments: str) -> float:
     """Standard uncertainty of the leg model in °."""
     joint = FIGURES[figure].variable.partition("_")[0]
-    known = ESTIMATED_DEG if worn != "feet" else FEET_ALONE_DEG
-    if worn == "feet" and FIGURES[figure].statistic == "at":
-        known = {**known, **FEET_ALONE_AT_CONTACT_DEG}
-    return known[joint]
+    reference = ESTIMATED_DEG if segments != "feet" else FEET_ALONE_DEG
+    if segments == "feet" and FIGURES[figure].statistic == "at":
+        reference = {**reference, **FEET_ALONE_AT_CONTACT_DEG}
+    return reference[joint]
 
 
-def by_figure(worn: str) -> dict[str, list[float]]:
+def by_figure(segments: str) -> dict[str, list[float]]:
     errors: dict[str, list[float]] = defaultdict(list)
-    for t in told(worn):
+    for t in told(segments):
         if t.error is not None:
             errors[t.name].append(t.error)
     return errors
@@ -100,9 +100,9 @@ def by_figure(worn: str) -> dict[str, list[float]]:
 
 @pytest.mark.parametrize("worn", WORN)
 def test_every_estimated_figure_that_is_told_is_within_its_uncertainty(worn: str) -> None:
-    known = [t for t in told(worn) if t.error is not None and t.uncertainty is not None]
-    assert len(known) > 200
-    assert all(abs(t.error or 0.0) < (t.uncertainty or 0.0) for t in known)
+    reference = [t for t in told(worn) if t.error is not None and t.uncertainty is not None]
+    assert len(reference) > 200
+    assert all(abs(t.error or 0.0) < (t.uncertainty or 0.0) for t in reference)
     for name, errors in by_figure(worn).items():
         assert np.sqrt(np.mean(np.square(errors))) < stated(name, worn), name
 
@@ -116,16 +116,24 @@ def test_what_is_withheld_says_why(worn: str) -> None:
 
 def test_write_down_the_parameters() -> None:
     rows = []
-    for worn in WORN:
-        errors = by_figure(worn)
+    for segment_names in WORN:
+        errors = by_figure(segment_names)
         for name in FIGURES:
-            found = np.array(errors.get(name, []))
-            held = sum(t.name == name and t.error is None for t in told(worn))
+            values = np.array(errors.get(name, []))
+            held = sum(t.name == name and t.error is None for t in told(segment_names))
             cells = ["–"] * 3
-            if len(found):
-                rms = np.sqrt(np.mean(found**2))
-                cells = [f"{found.mean():+.1f}", f"{rms:.1f}", f"{found[np.abs(found).argmax()]:+.0f}"]
-            rows.append([worn, name, *cells, f"{stated(name, worn):g}", f"{held} of {2 * len(PEOPLE)}"])
+            if len(values):
+                rms = np.sqrt(np.mean(values**2))
+                cells = [f"{values.mean():+.1f}", f"{rms:.1f}", f"{values[np.abs(values).argmax()]:+.0f}"]
+            rows.append(
+                [
+                    segment_names,
+                    name,
+                    *cells,
+                    f"{stated(name, segment_names):g}",
+                    f"{held} of {2 * len(PEOPLE)}",
+                ]
+            )
     record(
         "L7S: parameters of whole analyses",
         ["sensors", "figure", "mean error °", "RMS °", "largest °", "stated °", "withheld"],

@@ -75,14 +75,14 @@ TABLE_IV = (
 
 
 @cache
-def runs(movement: str, worn: Worn, adjoint: Adjoint) -> tuple[tuple[Trial, Poses], ...]:
+def runs(movement: str, segments: Worn, adjoint: Adjoint) -> tuple[tuple[Trial, Poses], ...]:
     """Everybody's take of a movement and what L7S makes of it."""
     takes = [trial(movement, height_m, seed) for height_m, seed in PEOPLE]
-    return tuple((take, take.run(worn, adjoint)) for take in takes)
+    return tuple((take, take.run(segments, adjoint)) for take in takes)
 
 
-def pooled(worn: Worn, adjoint: Adjoint, side: Side) -> list[Strides]:
-    return [strides_of(t, p, side) for m in MOVEMENTS for t, p in runs(m, worn, adjoint)]
+def pooled(segments: Worn, adjoint: Adjoint, side: Side) -> list[Strides]:
+    return [strides_of(t, p, side) for m in MOVEMENTS for t, p in runs(m, segments, adjoint)]
 
 
 @pytest.mark.parametrize(("worn", "adjoint"), RUNS)
@@ -92,45 +92,45 @@ def test_joint_angles_of_every_movement_are_within_the_limits(worn: Worn, adjoin
             scores = [cycle_scores(take, poses).mean(axis=0)]
             # the limits are of straight walking
             scores += [trial_scores(take, poses)] if movement == "walk" else []
-            for found in scores:
-                assert (found[:, 0] < RMSE_LIMIT[worn]).all(), movement
-                assert (found[:, 1] > R_LIMIT[worn]).all(), movement
+            for result in scores:
+                assert (result[:, 0] < RMSE_LIMIT[worn]).all(), movement
+                assert (result[:, 1] > R_LIMIT[worn]).all(), movement
 
 
 @pytest.mark.parametrize(("worn", "adjoint"), RUNS)
 def test_strides_and_the_way_of_every_movement_are_within_the_limits(worn: Worn, adjoint: Adjoint) -> None:
     for side in SIDES:
-        for found in pooled(worn, adjoint, side):
-            errors = found.found - found.true
+        for result in pooled(worn, adjoint, side):
+            errors = result.found - result.true
             assert 100.0 * np.sqrt(np.mean(errors**2)) < STRIDE_CM
-            assert abs(found.distance_error) < DISTANCE
+            assert abs(result.distance_error) < DISTANCE
 
 
 def test_table_v_is_written_down_beside_the_papers() -> None:
-    rows = [[source, f"L7S-{worn}", *cells, "–", "–"] for source, worn, *cells in TABLE_V]
+    rows = [[source, f"L7S-{segment_names}", *cells, "–", "–"] for source, segment_names, *cells in TABLE_V]
     rows += [
         ["Sy 2021, free walk", "L7S-3I", "–", "–", "–", "5.9 ± 1.3", "13.4 ± 1.9"],
         ["Sy 2021, free walk", "L7S-2I", "–", "–", "–", "6.4 ± 1.2", "12.7 ± 1.6"],
     ]
-    for worn, adjoint in RUNS:
-        cycles = np.concatenate([cycle_scores(t, p) for t, p in runs("walk", worn, adjoint)])
+    for segment_names, adjoint in RUNS:
+        cycles = np.concatenate([cycle_scores(t, p) for t, p in runs("walk", segment_names, adjoint)])
         rows.append(
             [
                 f"ours, simulated, straight cycles of “walk”, n={len(cycles)}",
-                f"L7S-{worn} {adjoint}",
+                f"L7S-{segment_names} {adjoint}",
                 *(f"{a.mean():.1f} ± {a.std():.1f} / {r:.2f}" for a, r in _columns(cycles)),
                 "–",
                 "–",
             ]
         )
-    for worn, adjoint in RUNS:
-        whole = [x for m in MOVEMENTS for x in runs(m, worn, adjoint)]
+    for segment_names, adjoint in RUNS:
+        whole = [x for m in MOVEMENTS for x in runs(m, segment_names, adjoint)]
         scores = np.array([trial_scores(t, p) for t, p in whole])
         apart = np.array([pose_errors(t, p) for t, p in whole])
         rows.append(
             [
                 f"ours, simulated, whole takes with turns, n={len(whole)}",
-                f"L7S-{worn} {adjoint}",
+                f"L7S-{segment_names} {adjoint}",
                 *(f"{a.mean():.1f} ± {a.std():.1f} / {r:.2f}" for a, r in _columns(scores)),
                 *(f"{e.mean():.1f} ± {e.std():.1f}" for e in apart.T),
             ]
@@ -149,22 +149,22 @@ def test_table_v_is_written_down_beside_the_papers() -> None:
 
 
 def test_table_iv_is_written_down_beside_the_papers() -> None:
-    rows = [[source, f"L7S-{worn}", *cells] for source, worn, *cells in TABLE_IV]
-    for worn, adjoint in RUNS:
+    rows = [[source, f"L7S-{segment_names}", *cells] for source, segment_names, *cells in TABLE_IV]
+    for segment_names, adjoint in RUNS:
         for side in SIDES:
-            takes = pooled(worn, adjoint, side)
+            takes = pooled(segment_names, adjoint, side)
             way = 100.0 * np.mean([abs(x.distance_error) for x in takes])
-            true, found, lasted = (
+            true, result, lasted = (
                 np.concatenate([getattr(x, name) for x in takes]) for name in ("true", "found", "duration_s")
             )
             walked = true > 0.05
             cells = [f"{way:.1f}"]
-            for a, b in ((found, true), (found / lasted, true / lasted)):
+            for a, b in ((result, true), (result / lasted, true / lasted)):
                 error = 100.0 * (a - b)[walked]
                 cells += [f"{100.0 * b[walked].mean():.0f}", f"{error.mean():+.1f} ± {error.std():.1f}"]
                 cells.append(f"{np.sqrt(np.mean(error**2)):.1f}")
             source = f"ours, simulated, n={int(walked.sum())}"
-            rows.append([source, f"L7S-{worn} {adjoint}", side[0].upper(), *cells])
+            rows.append([source, f"L7S-{segment_names} {adjoint}", side[0].upper(), *cells])
     record(
         "L7S: strides and speed beside Sy 2021 Table IV",
         [
@@ -223,9 +223,9 @@ def test_the_filter_alone_is_within_the_limits_when_orientations_are_given(worn:
     assert (scores[:, 0] < RMSE_LIMIT[worn]).all()
     assert (scores[:, 1] > R_LIMIT[worn]).all()
     for side in SIDES:
-        found = strides_of(take, poses, side)
-        assert 100.0 * np.sqrt(np.mean((found.found - found.true) ** 2)) < STRIDE_CM
-        assert abs(found.distance_error) < DISTANCE
+        strides = strides_of(take, poses, side)
+        assert 100.0 * np.sqrt(np.mean((strides.found - strides.true) ** 2)) < STRIDE_CM
+        assert abs(strides.distance_error) < DISTANCE
 
 
 APART: Final[tuple[tuple[float, str], ...]] = (
@@ -239,22 +239,22 @@ FOLDS_M: Final = 0.1
 
 def test_only_the_printed_adjoint_keeps_feet_together_whose_headings_disagree() -> None:
     take = trial("walk", *PEOPLE[1])
-    rows, kept = [], {}
+    rows, retained = [], {}
     for degrees, name in APART:
         off = turned_headings(take, {"foot_l": -degrees})
         cells = []
         for run in RUNS:
             poses = off.run(*run)
-            kept[degrees, run] = trial_scores(off, poses), max(poses.diagnostics["hinge_m"].values())  # type: ignore[attr-defined]
-            scores, hinge = kept[degrees, run]
+            retained[degrees, run] = trial_scores(off, poses), max(poses.diagnostics["hinge_m"].values())  # type: ignore[attr-defined]
+            scores, hinge = retained[degrees, run]
             broken = f", hinge {100.0 * hinge:.0f} cm" if hinge > 0.01 else ""
-            shown = " / ".join(f"{x:.1f}" for x in scores[:, 0]) + broken
+            view = " / ".join(f"{x:.1f}" for x in scores[:, 0]) + broken
             # how far a folded figure is off hangs on the last bit of its input: it is no figure to write down
-            cells.append("folds" if hinge > FOLDS_M else shown)
+            cells.append("folds" if hinge > FOLDS_M else view)
         rows.append([name, *cells])
     record(
         "L7S: feet whose headings disagree",
-        ["left foot °", *(f"{worn} {adjoint}" for worn, adjoint in RUNS)],
+        ["left foot °", *(f"{segment_names} {adjoint}" for segment_names, adjoint in RUNS)],
         rows,
         "Hip, knee and ankle flexion, RMSE without offset in °, of a simulated walk there and back in 30 s. "
         "Feet whose headings disagree walk apart, and only the constraints can hold them together. With the "
@@ -263,12 +263,15 @@ def test_only_the_printed_adjoint_keeps_feet_together_whose_headings_disagree() 
         "one they do up to ±10° (limits of straight walking asserted), which is why it is the default, "
         "although the exact one is better where headings agree.",
     )
-    for (degrees, (worn, adjoint)), (scores, hinge) in kept.items():
+    for (degrees, (segment_names, adjoint)), (scores, hinge) in retained.items():
         if abs(degrees) <= 10.0 and adjoint == "printed":
-            assert (scores[:, 0] < RMSE_LIMIT[worn]).all()
+            assert (scores[:, 0] < RMSE_LIMIT[segment_names]).all()
             assert hinge < 1e-3
-    for worn in get_args(Worn):
-        assert kept[-10.0, (worn, "exact")][1] > 0.01 or kept[10.0, (worn, "exact")][1] > 0.01
+    for segment_names in get_args(Worn):
+        assert (
+            retained[-10.0, (segment_names, "exact")][1] > 0.01
+            or retained[10.0, (segment_names, "exact")][1] > 0.01
+        )
 
 
 @pytest.mark.parametrize("worn", get_args(Worn))

@@ -1,9 +1,8 @@
-"""Wrong handling of two and three sensors on neura_walk: how wrong L7S gets, and what it says about it.
+"""Wrong handling of two and three sensors on neura_walk: L7S errors and notices.
 
-The mistake is made on the recording, then the product's chain runs. Vicon only tells how wrong angles are.
-With seven sensors the joints show a mistake (test_estimators_neura_wrong.py); here no joint has two sensors,
-and what shows it is how people walk (core/body/l7s/checks.py). Limits there were set on simulation and on
-this walk, right and with the feet exchanged.
+Mistakes are applied to the recording before the product's chain; Vicon only scores. Without joints measured
+by two sensors, plausibility of walking reveals mistakes (core/body/l7s/checks.py), with limits from
+simulation and this walk, correct and with swapped feet.
 """
 
 from __future__ import annotations
@@ -43,7 +42,7 @@ WORN: Final[dict[Estimator, tuple[Segment, ...]]] = {
 
 @dataclass(frozen=True)
 class Result:
-    """Mean RMSE of hip, knee and ankle flexion in ° against Vicon, and what the take says."""
+    """Mean RMSE of hip, knee and ankle flexion in ° against Vicon, and the trial's notices."""
 
     rmse: tuple[float, ...]
     codes: frozenset[str]
@@ -51,8 +50,8 @@ class Result:
 
 
 def with_sensors(recording: UniformRecording, **sensors: SensorSignals) -> UniformRecording:
-    worn = {s: x for s, x in sensors.items() if s in recording.sensors}
-    return replace(recording, sensors={**recording.sensors, **worn})  # type: ignore[dict-item]
+    segments = {s: x for s, x in sensors.items() if s in recording.sensors}
+    return replace(recording, sensors={**recording.sensors, **segments})  # type: ignore[dict-item]
 
 
 def exchanged(a: Segment, b: Segment) -> Callable[[UniformRecording], UniformRecording]:
@@ -119,20 +118,22 @@ def result(name: str, estimator: Estimator) -> Result | str:
     try:
         calibrated = calibration.calibrate(take)
         orientations = estimate_orientations(calibrated)
-        found = events.detect(orientations)
-        contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
+        detections = events.detect(orientations)
+        contacts = {
+            s: contact_mask(take.t_s, detections.times(s, "ic"), detections.times(s, "tc")) for s in SIDES
+        }
         params = PoseParams(estimator=estimator)
         mounted = replace(mount_sensors(calibrated, orientations, params), body=BODY)
-        made = estimate_poses(mounted, contacts, params)
+        poses = estimate_poses(mounted, contacts, params)
     except SagittalError as error:
         return error.code
-    q = dict(made.poses.q)
+    q = dict(poses.poses.q)
     valid = np.ones(len(take.t_s), bool)
     posed = Orientations(take.t_s, take.rate_hz, q, dict.fromkeys(q, valid), "")
     _, against = scores(angles_deg(posed, calibrated))
     rmse = tuple(float(np.mean([against[f"{n}_{e}"].offset_removed for e in "rl"])) for n in FLEXION)
-    notices = (*calibrated.calibration.notices, *made.poses.notices)
-    beyond = tuple(f for f in made.poses.health if f.verdict != "good")
+    notices = (*calibrated.calibration.notices, *poses.poses.notices)
+    beyond = tuple(f for f in poses.poses.health if f.verdict != "good")
     return Result(rmse, frozenset(n.code for n in notices), beyond)
 
 
@@ -141,28 +142,28 @@ PAIRS: Final = [(name, e) for name, (_, _, estimators) in CASES.items() for e in
 
 @pytest.mark.parametrize(("name", "estimator"), PAIRS)
 def test_what_is_wrong_is_told_and_what_is_right_is_not_accused(name: str, estimator: Estimator) -> None:
-    found = result(name, estimator)
+    results = result(name, estimator)
     if name == "right":
-        assert isinstance(found, Result)
-        assert not found.beyond
-        assert not any(found.codes & codes for _, codes, _ in CASES.values())
+        assert isinstance(results, Result)
+        assert not results.beyond
+        assert not any(results.codes & codes for _, codes, _ in CASES.values())
         return
-    assert isinstance(found, str) or found.codes & CASES[name][1]
+    assert isinstance(results, str) or results.codes & CASES[name][1]
 
 
 def test_write_down_the_figures() -> None:
     rows = []
     for name, estimator in PAIRS:
-        found = result(name, estimator)
+        results = result(name, estimator)
         cells = [name, estimator.upper().replace("_", "-")]
-        if isinstance(found, str):
-            rows.append([*cells, "–", f"error {found}", "bad"])
+        if isinstance(results, str):
+            rows.append([*cells, "–", f"error {results}", "bad"])
             continue
-        shown = [f"{f.name} {f.of + ' ' if f.of else ''}{f.value:.2g}" for f in found.beyond]
+        view = [f"{f.name} {f.of + ' ' if f.of else ''}{f.value:.2g}" for f in results.beyond]
         cells += [
-            " / ".join(f"{x:.1f}" for x in found.rmse),
-            ", ".join(shown) or "–",
-            find_worst_verdict(found.beyond),
+            " / ".join(f"{x:.1f}" for x in results.rmse),
+            ", ".join(view) or "–",
+            find_worst_verdict(results.beyond),
         ]
         rows.append(cells)
     record(

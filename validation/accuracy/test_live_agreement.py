@@ -1,6 +1,6 @@
-"""Mistakes of a clinic while samples come: told after how long, of whom, and whether as the file does.
+"""Typical clinic mistakes during streaming: delay and sensor of the notices, and agreement with the file.
 
-Every run has a third of the mistakes of two walks; all are run with `--write-figures`.
+Each run covers a third of the mistakes on two walks; `--write-figures` runs all.
 """
 
 from __future__ import annotations
@@ -52,9 +52,9 @@ def take(name: str) -> UniformRecording:
     if name == "neura_walk":
         return synchronise(seven(neura_recording()))
     if name == "neura_walk, lower":
-        made = neura_recording()
-        kept = {d: None if s in LOWER_SHANK.values() else s for d, s in made.segments.items()}
-        return synchronise(seven(replace(made, segments={**kept, **LOWER_SHANK})))
+        result = neura_recording()
+        retained = {d: None if s in LOWER_SHANK.values() else s for d, s in result.segments.items()}
+        return synchronise(seven(replace(result, segments={**retained, **LOWER_SHANK})))
     return synchronise(seven(simulate_scenario(name, seed=5).recording))
 
 
@@ -73,7 +73,7 @@ def walked_until(recording: UniformRecording, since_s: float, until_s: float) ->
 
 @dataclass(frozen=True)
 class Heard:
-    """What was told live of one mistake, after how much walking, and what the file says."""
+    """Live notices of one mistake, with the amount of walking before them, and notices of the file."""
 
     told: frozenset[tuple[str, str | None]]
     after_s: float | None
@@ -86,11 +86,11 @@ def name_of(notice: Notice) -> tuple[str, str | None]:
 
 
 def hear(recording: UniformRecording, standing: tuple[int, ...], since_s: float) -> Heard:
-    told = [(t, n) for t, n in listen(recording, standing)[1] if n.code in CODES]
+    notices = [(t, n) for t, n in listen(recording, standing)[1] if n.code in CODES]
     file = [n for n in check_agreement(recording).recording.notices if n.code in CODES]
     return Heard(
-        frozenset(name_of(n) for _, n in told),
-        walked_until(recording, since_s, told[0][0]) if told else None,
+        frozenset(name_of(n) for _, n in notices),
+        walked_until(recording, since_s, notices[0][0]) if notices else None,
         frozenset(name_of(n) for n in file),
     )
 
@@ -107,7 +107,7 @@ def late_or_exchanged(name: str) -> Mapping[tuple[str, str], Heard]:
 
 @cache
 def slipped(name: str) -> Mapping[tuple[str, Segment], Heard]:
-    right, found = take(name), {}
+    right, result = take(name), {}
     at_s = find_middle(right)
     if name.startswith("neura_walk"):
         at_s += right.t_s[-1] + 1.0 / right.rate_hz
@@ -116,8 +116,8 @@ def slipped(name: str) -> Mapping[tuple[str, Segment], Heard]:
         for segment in sample(LEG_SENSORS, 3, n):
             if not (name == "healthy" and segment.endswith("_r")):
                 wrong = slip_sensor(right, segment, np.radians(by_deg), at_s)
-                found[kind, segment] = hear(wrong, stood(name), at_s)
-    return found
+                result[kind, segment] = hear(wrong, stood(name), at_s)
+    return result
 
 
 @pytest.mark.parametrize("name", EACH)
@@ -131,10 +131,10 @@ def test_late_and_exchanged_sensors_are_told_as_by_the_file(name: str) -> None:
 
 @pytest.mark.parametrize("name", EACH)
 def test_a_slip_is_told_of_the_right_sensor(name: str) -> None:
-    found = slipped(name)
-    for (kind, segment), x in found.items():
+    result = slipped(name)
+    for (kind, segment), x in result.items():
         assert x.told <= {("sensor_slipped", segment)}, (kind, segment)
-    large = [x for (kind, _), x in found.items() if "15°" in kind]
+    large = [x for (kind, _), x in result.items() if "15°" in kind]
     share = 0.75 if name.startswith("neura_walk") else 1.0
     assert sum(bool(x.told) for x in large) >= share * len(large) > 0
 
@@ -143,8 +143,8 @@ def test_a_slip_is_told_of_the_right_sensor(name: str) -> None:
 def right_walks() -> Mapping[str, UniformRecording]:
     walks = {x: take(x) for x in TAKES} | {"qmt_fullbody": qmt_take(QMT)}
     for name in sample(list(SCRIPTS), 6):
-        made = simulated(name, 1)[0]
-        walks[f"{name}, script"] = only(made, *(s for s in WORN if s in made.sensors))
+        simulation = simulated(name, 1)[0]
+        walks[f"{name}, script"] = only(simulation, *(s for s in WORN if s in simulation.sensors))
     for name, seed, height in sample(PEOPLE, 6):
         scene = simulate_scenario(name, seed=seed, height_m=height)
         walks[f"{name}, {height} m"] = synchronise(seven(scene.recording))
@@ -154,12 +154,12 @@ def right_walks() -> Mapping[str, UniformRecording]:
 
 
 def test_right_walks_are_accused_of_nothing() -> None:
-    told = {}
+    messages = {}
     for name, walk in right_walks().items():
-        found = listen(walk, find_standings(walk))[1]
-        if found:
-            told[name] = [(n.code, n.sensor) for _, n in found]
-    assert told == {}
+        notices = listen(walk, find_standings(walk))[1]
+        if notices:
+            messages[name] = [(n.code, n.sensor) for _, n in notices]
+    assert messages == {}
 
 
 @whole_only
@@ -169,11 +169,11 @@ def test_write_down_the_figures() -> None:
         row = [kind]
         for name in TAKES:
             every = slipped(name) if kind in SLIPS else late_or_exchanged(name)
-            found = [x for (k, _), x in every.items() if k == kind]
-            after = [x.after_s for x in found if x.after_s is not None]
-            row.append(f"{len(after)} of {len(found)}")
-            row.append(f"{np.median(after):.0f} ({max(after):.0f})" if after else "–")
-            row.append(f"{sum(x.told == x.file for x in found)} of {len(found)}")
+            result = [x for (k, _), x in every.items() if k == kind]
+            final_after_s = [x.after_s for x in result if x.after_s is not None]
+            row.append(f"{len(final_after_s)} of {len(result)}")
+            row.append(f"{np.median(final_after_s):.0f} ({max(final_after_s):.0f})" if final_after_s else "–")
+            row.append(f"{sum(x.told == x.file for x in result)} of {len(result)}")
         rows.append(row)
     record(
         "Mistakes of a clinic, live",

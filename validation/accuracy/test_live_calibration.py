@@ -70,9 +70,9 @@ def live(name: str) -> LiveCalibration:
     for a in range(0, len(recording.t_s), 10):
         p = slice(a, a + 10)
         block = UniformBlock(a, recording.t_s[p], acc[p], gyr[p], valid[p], filled[p])
-        found = calibrator.push(block)
-        if found is not None:
-            return found
+        frame = calibrator.push(block)
+        if frame is not None:
+            return frame
     raise AssertionError(f"{name}: never calibrated; {calibrator.stage}, {calibrator.view}")
 
 
@@ -97,8 +97,10 @@ def apart(a: Calibration, b: Calibration) -> dict[Segment, tuple[float, float]]:
 
 @pytest.mark.parametrize("name", WALKS)
 def test_the_first_steps_give_nearly_the_axes_of_the_whole_take(name: str) -> None:
-    found = live(name)
-    for segment, (forward, up) in apart(found.calibrated.calibration, offline(name).calibration).items():
+    live_result = live(name)
+    for segment, (forward, up) in apart(
+        live_result.calibrated.calibration, offline(name).calibration
+    ).items():
         assert forward < LIMIT_DEG, (segment, forward)
         assert up < 1.0, (segment, up)
 
@@ -110,26 +112,28 @@ def test_the_attempt_is_called_good(name: str) -> None:
 
 @pytest.mark.parametrize("name", PATIENTS)
 def test_virtual_patients_are_calibrated_live(name: str) -> None:
-    found = live(name)
-    assert set(found.calibrated.calibration.segments) >= set(SEGMENTS)
+    live_result = live(name)
+    assert set(live_result.calibrated.calibration.segments) >= set(SEGMENTS)
 
 
 def test_write_down_the_figures() -> None:
     rows = []
     for name in (*WALKS, *PATIENTS):
-        found = live(name)
-        off = apart(found.calibrated.calibration, offline(name).calibration)
+        live_result = live(name)
+        off = apart(live_result.calibrated.calibration, offline(name).calibration)
         forward = {s: off[s][0] for s in SEGMENTS}
         worst = max(forward, key=lambda s: forward[s])
         rows.append(
             [
                 name,
-                f"{(found.past - found.first) / found.calibrated.recording.rate_hz:.1f}",
-                f"{found.calibrated.calibration.straight_steps}",
+                f"{(live_result.past - live_result.first) / live_result.calibrated.recording.rate_hz:.1f}",
+                f"{live_result.calibrated.calibration.straight_steps}",
                 f"{np.mean(list(forward.values())):.1f}",
                 f"{forward[worst]:.1f} ({worst})",
                 f"{max(x[1] for x in off.values()):.1f}",
-                "good" if found.ok else ", ".join(sorted({n.code for c in found.checks for n in c.notices})),
+                "good"
+                if live_result.ok
+                else ", ".join(sorted({n.code for c in live_result.checks for n in c.notices})),
             ]
         )
     record(

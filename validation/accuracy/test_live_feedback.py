@@ -1,7 +1,7 @@
-"""Feedback over a whole live walk: every cue finds its stride in the analysis of the same take.
+"""Feedback over a whole live walk: every cue matches a stride of the analysed trial.
 
 A virtual person with hemiparesis walks, the chain calibrates itself on the first steps, and the engine judges
-its strides; what the person was told is then held against the finished analysis.
+its strides; cues are compared with the finished analysis.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def offline() -> MeasuredGait:
 
 
 def coached(parameter: str, *sizes: int) -> list[Cue]:
-    given = Prescription.from_json(
+    inputs = Prescription.from_json(
         {
             "parameter": parameter,
             "side": "left",
@@ -53,13 +53,13 @@ def coached(parameter: str, *sizes: int) -> list[Cue]:
                          "probe_every": 4, "probe_strides": 2},
         }
     )  # fmt: skip
-    engine = FeedbackEngine(given)
-    found = (engine.push(stride, frame.t_s) for frame in frames(*sizes) for stride in frame.strides)
-    return [cue for cue in found if cue is not None]
+    engine = FeedbackEngine(inputs)
+    result = (engine.push(stride, frame.t_s) for frame in frames(*sizes) for stride in frame.strides)
+    return [cue for cue in result if cue is not None]
 
 
 def matched(parameter: str) -> tuple[list[Cue], FeedbackSplit, int]:
-    """Cues, what they found, and how many strides of the side count in the end."""
+    """Cues, matched strides, and number of finally counted strides of the side."""
     cues = coached(parameter, 10)
     measured = offline()
     strides = [
@@ -71,30 +71,30 @@ def matched(parameter: str) -> tuple[list[Cue], FeedbackSplit, int]:
 
 @pytest.mark.parametrize("parameter", LIMITS)
 def test_every_cue_finds_its_stride_and_told_nearly_its_final_value(parameter: str) -> None:
-    cues, found, counted = matched(parameter)
-    assert found.unmatched == 0
-    assert len(found.strides) >= 0.9 * counted, "few strides that count in the end were not coached"
-    assert found.left_out <= 0.1 * len(cues), "some are only seen to be the last of a walk afterwards"
-    told = found.live_difference
-    assert told.mean is not None
-    assert told.sd is not None
+    cues, result, counted_strides = matched(parameter)
+    assert result.unmatched == 0
+    assert len(result.strides) >= 0.9 * counted_strides, "few strides that count in the end were not coached"
+    assert result.left_out <= 0.1 * len(cues), "some are only seen to be the last of a walk afterwards"
+    live_difference = result.live_difference
+    assert live_difference.mean is not None
+    assert live_difference.sd is not None
     mean, sd = LIMITS[parameter]
-    assert abs(told.mean) < mean
-    assert told.sd < sd
+    assert abs(live_difference.mean) < mean
+    assert live_difference.sd < sd
 
 
 def test_what_was_told_is_written_down_beside_what_was_found() -> None:
     rows = []
     for parameter in LIMITS:
-        cues, found, _ = matched(parameter)
-        told = found.live_difference
-        numbers = f"{told.mean:+.3f} ± {told.sd:.3f}"
-        rows.append((parameter, str(len(cues)), str(found.unmatched), str(found.left_out), numbers))
-    told = matched("knee_flexion_max_swing_deg")[1].live_difference
+        cues, result, _ = matched(parameter)
+        live_difference = result.live_difference
+        numbers = f"{live_difference.mean:+.3f} ± {live_difference.sd:.3f}"
+        rows.append((parameter, str(len(cues)), str(result.unmatched), str(result.left_out), numbers))
+    live_difference = matched("knee_flexion_max_swing_deg")[1].live_difference
     record_in_short(
         "Live cue − final value, knee flexion °",
         "–",
-        f"{told.mean:+.3f} ± {told.sd:.3f}",
+        f"{live_difference.mean:+.3f} ± {live_difference.sd:.3f}",
         f"simulated, {WHO}",
     )
     record(

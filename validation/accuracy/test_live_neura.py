@@ -1,8 +1,7 @@
-"""The live chain on neura_walk: what a tablet would have shown, sample by sample, against Vicon and offline.
+"""Live chain on neura_walk, sample by sample, against Vicon and offline results.
 
-The chain knows nothing that comes later, except that its calibration looks back at the walk so far. Limits
-are those of docs/science/real-recordings.md, "Limits", for any pipeline; what a live set reached is beside
-them.
+The chain is causal, except that its calibration uses the walk so far. Limits:
+docs/science/real-recordings.md, "Limits", for any pipeline; results of a live set are listed next to them.
 """
 
 from __future__ import annotations
@@ -93,10 +92,10 @@ def gaitmap_mm(side: Side, trailing: bool) -> Floats:
 def test_live_angles_are_within_the_limits_of_any_pipeline() -> None:
     for name, (zeroed, removed, least) in LIMITS.items():
         for i, end in enumerate("rl"):
-            found = scored()[f"{name}_{end}"]
-            assert found.zeroed <= zeroed[i], (name, end)
-            assert found.offset_removed <= removed[i], (name, end)
-            assert found.r >= least[i], (name, end)
+            result = scored()[f"{name}_{end}"]
+            assert result.zeroed <= zeroed[i], (name, end)
+            assert result.offset_removed <= removed[i], (name, end)
+            assert result.r >= least[i], (name, end)
 
 
 def test_live_contacts_are_those_of_the_whole_take() -> None:
@@ -119,22 +118,26 @@ def test_a_rule_that_trails_costs_no_stride_on_gaitmap(side: Side) -> None:
 
 
 def test_write_down_the_figures() -> None:
-    made = run()
+    result = run()
     rows = []
     for plane in PLANES:
         for name in plane:
             pair = [scored()[f"{name}_{end}"] for end in "rl"]
-            cells = ["/".join(f"{getattr(x, of):.1f}" for x in pair) for of in ("zeroed", "offset_removed")]
+            cells = [
+                "/".join(f"{getattr(x, source):.1f}" for x in pair) for source in ("zeroed", "offset_removed")
+            ]
             cells.append("/".join(f"{x.r:.3f}" for x in pair))
             limit = LIMITS.get(name)
-            shown = "none"
+            visible_text = "none"
             if limit is not None:
                 forms = (".1f", ".1f", ".3f")
-                shown = " · ".join("/".join(f"{x:{f}}" for x in p) for p, f in zip(limit, forms, strict=True))
-            rows.append([name.replace("_", " "), *cells, shown, SPEC.get(name, "")])
-    apart, _ = nearest(made.events)
+                visible_text = " · ".join(
+                    "/".join(f"{x:{f}}" for x in p) for p, f in zip(limit, forms, strict=True)
+                )
+            rows.append([name.replace("_", " "), *cells, visible_text, SPEC.get(name, "")])
+    apart, _ = nearest(result.events)
     strides = ", ".join(f"{s} {strides_cm(s).mean():+.1f} ± {strides_cm(s).std():.1f} cm" for s in SIDES)
-    began = next(f for f in made.frames if f.stage == "running").t_s
+    began = next(f for f in result.frames if f.stage == "running").t_s
     lone = "; ".join(
         f"{s} {gaitmap_mm(s, True).mean():+.0f} ± {gaitmap_mm(s, True).std():.0f} "
         f"(centred {gaitmap_mm(s, False).mean():+.0f} ± {gaitmap_mm(s, False).std():.0f})"

@@ -1,7 +1,7 @@
-"""The live chain against the truth of virtual people: angles, distances and contacts as a tablet shows them.
+"""Live chain against the truth of virtual people: angles, distances and contacts.
 
-Sensors sit on skin and have the errors of their kind; the chain calibrates itself on the first steps. Only
-what comes after is scored. Every run walks a third of the people; all walk with `--write-figures`.
+Sensors are on skin with typical errors; the chain calibrates itself on the first steps, which are not scored.
+Each run covers a third of the people; `--write-figures` covers all.
 """
 
 from __future__ import annotations
@@ -64,12 +64,12 @@ class Scored:
 
 def scored(run: Run, truth: WalkTruth) -> Scored:
     began = next(f.t_s for f in run.frames if f.stage == "running")
-    after = np.flatnonzero(truth.t_s > began)
-    found, true = run.angles_deg, truth.subtract_standing()
-    after = after[after < len(next(iter(found.values())))]
+    final = np.flatnonzero(truth.t_s > began)
+    angles_deg, true = run.angles_deg, truth.subtract_standing()
+    final = final[final < len(next(iter(angles_deg.values())))]
 
     def rmse(name: str) -> float:
-        off = found[name][after] - np.degrees(true[name][after])
+        off = angles_deg[name][final] - np.degrees(true[name][final])
         off = (off + 180.0) % 360.0 - 180.0
         return float(np.sqrt(np.mean(off**2)))
 
@@ -82,32 +82,32 @@ def scored(run: Run, truth: WalkTruth) -> Scored:
 def stride_mm(run: Run, truth: WalkTruth, side: Side, began: float) -> Floats:
     """Told minus true lengths of the counted strides of a foot, matched by their contacts."""
     off: list[float] = []
-    for told in run.strides:
-        length = told.values["stride_length_m"]
+    for stride in run.strides:
+        length = stride.values["stride_length_m"]
         if (
-            not told.complete
-            or not told.counted
-            or told.side != side
-            or told.start_s < began
+            not stride.complete
+            or not stride.counted
+            or stride.side != side
+            or stride.start_s < began
             or length is None
         ):
             continue
         off += [
             1e3 * (length - true.length_m)
             for true in truth.strides
-            if true.side == side and abs(true.start_s - told.start_s) + abs(true.end_s - told.end_s) < 0.3
+            if true.side == side and abs(true.start_s - stride.start_s) + abs(true.end_s - stride.end_s) < 0.3
         ]
     return np.array(off)
 
 
 def contact_ms(run: Run, truth: WalkTruth) -> Floats:
-    """Initial contacts, told minus true."""
+    """Initial contacts, detected minus true."""
     off: list[float] = []
     for side in SIDES:
         true = truth.contacts[side].contact
-        told = np.array([e.time_s for e in run.events if e.side == side and e.kind == "ic"])
-        apart = told[:, None] - true
-        off += (1e3 * apart[np.arange(len(told)), np.abs(apart).argmin(axis=1)]).tolist()
+        values = np.array([e.time_s for e in run.events if e.side == side and e.kind == "ic"])
+        apart = values[:, None] - true
+        off += (1e3 * apart[np.arange(len(values)), np.abs(apart).argmin(axis=1)]).tolist()
     return np.array(off)
 
 
@@ -120,14 +120,14 @@ def of(person: str, seed: int) -> Scored:
 @pytest.mark.parametrize("person", sample(PEOPLE, 3))
 def test_what_is_shown_live_is_what_the_person_does(person: str) -> None:
     for seed in SEEDS:
-        made = of(person, seed)
-        assert made.angles["flexion"] <= FLEXION_DEG
-        assert made.angles["frontal"] <= FRONTAL_DEG
-        assert made.angles["rotation"] <= ROTATION_DEG
-        assert len(made.strides) >= 10
-        assert abs(made.strides.mean()) <= STRIDE_BIAS_MM
-        assert made.strides.std() <= STRIDE_SD_MM
-        assert abs(np.median(made.contacts)) <= CONTACT_MS
+        result = of(person, seed)
+        assert result.angles["flexion"] <= FLEXION_DEG
+        assert result.angles["frontal"] <= FRONTAL_DEG
+        assert result.angles["rotation"] <= ROTATION_DEG
+        assert len(result.strides) >= 10
+        assert abs(result.strides.mean()) <= STRIDE_BIAS_MM
+        assert result.strides.std() <= STRIDE_SD_MM
+        assert abs(np.median(result.contacts)) <= CONTACT_MS
 
 
 def relative_heading_deg(seed: int) -> Floats:
@@ -138,10 +138,10 @@ def relative_heading_deg(seed: int) -> Floats:
     part = slice(run.chain.first, run.chain.first + len(course))
     off = []
     for i, segment in enumerate(COURSES[1:], 1):
-        told, true = (yaw(x) - yaw(y) for x, y in (
+        notices, true = (yaw(x) - yaw(y) for x, y in (
             (course[:, i], course[:, 0]), (truth.q[segment][part], truth.q["pelvis"][part]),
         ))  # fmt: skip
-        apart = np.exp(1j * (told - true))
+        apart = np.exp(1j * (notices - true))
         minute = round(60.0 * recording.rate_hz)
         off.append(np.angle(apart[-minute:].mean() / apart[:minute].mean()))
     return np.asarray(np.degrees(off))
@@ -160,12 +160,12 @@ def test_feet_that_are_not_held_drift_off_the_pelvis() -> None:
 def test_write_down_the_figures() -> None:
     rows = []
     for person in sample(PEOPLE, 3):
-        made = [of(person, seed) for seed in SEEDS]
-        strides = np.concatenate([x.strides for x in made])
-        contacts = np.concatenate([x.contacts for x in made])
+        result = [of(person, seed) for seed in SEEDS]
+        strides = np.concatenate([x.strides for x in result])
+        contacts = np.concatenate([x.contacts for x in result])
         rows.append([
             person.replace("_", " "),
-            *("/".join(f"{x.angles[g]:.1f}" for x in made) for g in GROUPS),
+            *("/".join(f"{x.angles[g]:.1f}" for x in result) for g in GROUPS),
             str(len(strides)), f"{strides.mean():+.0f} ± {strides.std():.0f}",
             f"{np.median(contacts):+.0f}",
         ])  # fmt: skip

@@ -38,17 +38,17 @@ def estimated(method: Method = "walking_direction") -> dict[str, Floats]:
 
 
 def test_flexion_agrees_with_vicon_within_the_limits_on_both_sides() -> None:
-    lag, found = scores(estimated())
+    lag, result = scores(estimated())
     rows = []
     for plane in PLANES:
         for name in plane:
-            right, left = found[f"{name}_r"], found[f"{name}_l"]
-            shown = "/".join(f"{x:.1f}" for x in RMSE_LIMIT[name]) if name in RMSE_LIMIT else "none"
+            right, left = result[f"{name}_r"], result[f"{name}_l"]
+            view = "/".join(f"{x:.1f}" for x in RMSE_LIMIT[name]) if name in RMSE_LIMIT else "none"
             rows.append(
                 [
                     name.replace("_", " "),
                     f"{right.offset_removed:.1f}/{left.offset_removed:.1f}",
-                    shown,
+                    view,
                     f"{right.zeroed:.1f}/{left.zeroed:.1f}",
                     f"{right.raw:.1f}/{left.raw:.1f}",
                     f"{right.r:.3f}/{left.r:.3f}",
@@ -64,23 +64,23 @@ def test_flexion_agrees_with_vicon_within_the_limits_on_both_sides() -> None:
     )
     for name, limits in RMSE_LIMIT.items():
         for side, limit in zip("rl", limits, strict=True):
-            assert found[f"{name}_{side}"].offset_removed <= limit, f"{name} {side}"
-            assert found[f"{name}_{side}"].r >= R_LIMIT[name], f"{name} {side}"
+            assert result[f"{name}_{side}"].offset_removed <= limit, f"{name} {side}"
+            assert result[f"{name}_{side}"].r >= R_LIMIT[name], f"{name} {side}"
 
 
 def test_adduction_shows_that_headings_are_right() -> None:
     """Flexion is blind to axial mounting errors; adduction is not
     (docs/science/real-recordings.md, "Findings"; "Limits" + 20 %)."""
-    _, found = scores(estimated())
-    assert found["hip_adduction_r"].offset_removed <= 5.4
-    assert found["hip_adduction_l"].offset_removed <= 4.3
-    assert found["hip_adduction_r"].r >= 0.6
-    assert found["hip_adduction_l"].r >= 0.8
-    assert found["hip_rotation_r"].offset_removed <= 5.0
+    _, result = scores(estimated())
+    assert result["hip_adduction_r"].offset_removed <= 5.4
+    assert result["hip_adduction_l"].offset_removed <= 4.3
+    assert result["hip_adduction_r"].r >= 0.6
+    assert result["hip_adduction_l"].r >= 0.8
+    assert result["hip_rotation_r"].offset_removed <= 5.0
 
 
 def test_thigh_sensors_swapped_are_seen_by_the_scoring() -> None:
-    """A check that cannot fail is none: the same scoring on swapped thighs is far beyond the limits."""
+    """Negative control: the same scoring on swapped thighs is far beyond the limits."""
     recording = neura_walk()
     swap = {
         **recording.sensors,
@@ -89,21 +89,21 @@ def test_thigh_sensors_swapped_are_seen_by_the_scoring() -> None:
     }
     calibrated = calibrate(replace(recording, sensors=swap))
     angles = measure_angles(estimate_orientations(calibrated), calibrated.calibration.zero)
-    _, found = scores({n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()})
-    assert found["hip_flexion_r"].offset_removed > 15.0
-    assert found["knee_flexion_l"].offset_removed > 15.0
+    _, result = scores({n: np.degrees(x + angles.zero_offset[n]) for n, x in angles.angles.items()})
+    assert result["hip_flexion_r"].offset_removed > 15.0
+    assert result["knee_flexion_l"].offset_removed > 15.0
 
 
 def test_gyro_pca_is_a_working_alternative() -> None:
-    _, found = scores(estimated("gyro_pca"))
+    _, result = scores(estimated("gyro_pca"))
     record(
         "Calibration by gyro PCA on neura_walk",
         ["angle, right/left", "RMSE offset removed °", "r"],
         [
             [
                 name.replace("_", " "),
-                f"{found[f'{name}_r'].offset_removed:.1f}/{found[f'{name}_l'].offset_removed:.1f}",
-                f"{found[f'{name}_r'].r:.3f}/{found[f'{name}_l'].r:.3f}",
+                f"{result[f'{name}_r'].offset_removed:.1f}/{result[f'{name}_l'].offset_removed:.1f}",
+                f"{result[f'{name}_r'].r:.3f}/{result[f'{name}_l'].r:.3f}",
             ]
             for plane in PLANES[:2]
             for name in plane
@@ -112,15 +112,16 @@ def test_gyro_pca_is_a_working_alternative() -> None:
     )
     for name, limits in RMSE_LIMIT.items():
         for side, limit in zip("rl", limits, strict=True):
-            assert found[f"{name}_{side}"].offset_removed <= limit, f"{name} {side}"
+            assert result[f"{name}_{side}"].offset_removed <= limit, f"{name} {side}"
 
 
 @pytest.mark.parametrize(
     "segment", ["pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"]
 )
 def test_velocity_and_acceleration_find_the_same_walking_direction(segment: str) -> None:
-    """Two independent measures within the 15° beyond which a notice is due
-    (docs/science/real-recordings.md, "Heading")."""
+    """Two independent measures agree within the 15° of the notice
+    (docs/science/real-recordings.md, "Heading").
+    """
     facts = calibrate(neura_walk()).calibration.diagnostics[segment]
     assert isinstance(facts, dict)
     assert facts["source"] == ("strides" if segment in FOOT.values() else "velocity")

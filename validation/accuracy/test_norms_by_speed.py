@@ -1,9 +1,9 @@
-"""The norm at the person's speed: people left out, and what other laboratories measured.
+"""Norm at the person's speed: people left out, and data of other laboratories.
 
-The 52 adults behind the model (means of a person at five speeds) are each held against the model made of the
-others. Children and adults of two other sets are held against their own comfortable curve moved to the slow
-speed, which is what the product does with the WBDS adults. How the level is blended in, and the form of the
-model, were chosen with these sets in view; the shipped coefficients were not fitted on the others.
+Each of the 52 adults (means at five speeds) is compared with the model of the others. Children and adults of
+two other sets are compared with their own comfortable curve moved to the slow speed, as the product does with
+the WBDS adults. Level blending and form of the model were chosen in view of these sets; the coefficients were
+not fitted to them.
 """
 
 from __future__ import annotations
@@ -71,19 +71,19 @@ def test_people_left_out_are_nearer_to_the_norm_at_their_speed() -> None:
         model, off = curve_models()[variable], left_out(variable)
         fixed = curves - model.mean(COMFORTABLE)
         for (low, high), limit in zip(BINS, limits, strict=True):
-            of = np.flatnonzero((v >= low) & (v < high))
+            indices = np.flatnonzero((v >= low) & (v < high))
             # the band of one side, as it is drawn; mean of both sides here
-            sd = np.array([bands_at_speed(None, float(x))[variable].sd_deg for x in v[of]])
+            sd = np.array([bands_at_speed(None, float(x))[variable].sd_deg for x in v[indices]])
             usual = adult_kinematics(None).bands[variable].sd_deg
-            rms, rms_fixed = (float(np.sqrt(np.mean(x[of] ** 2))) for x in (off, fixed))
-            bias = float(np.sqrt(np.mean(off[of].mean(axis=0) ** 2)))
-            inside = 100.0 * float(np.mean(np.abs(off[of]) <= 2.0 * sd))
-            inside_fixed = 100.0 * float(np.mean(np.abs(fixed[of]) <= 2.0 * usual))
+            rms, rms_fixed = (float(np.sqrt(np.mean(x[indices] ** 2))) for x in (off, fixed))
+            bias = float(np.sqrt(np.mean(off[indices].mean(axis=0) ** 2)))
+            inside = 100.0 * float(np.mean(np.abs(off[indices]) <= 2.0 * sd))
+            inside_fixed = 100.0 * float(np.mean(np.abs(fixed[indices]) <= 2.0 * usual))
             rows.append(
                 [
                     variable.replace("_", " "),
                     f"{low:g}–{high:g}",
-                    f"{len(np.unique(subject[of]))}",
+                    f"{len(np.unique(subject[indices]))}",
                     f"{rms:.1f} / {rms_fixed:.1f}",
                     f"{bias:.1f}",
                     f"{inside:.0f} / {inside_fixed:.0f}",
@@ -112,14 +112,14 @@ def test_scores_of_people_left_out_spread_as_the_reference_says() -> None:
         _, v, _ = people(variable)
         off = left_out(variable)
         for low, high in BINS:
-            of = np.flatnonzero((v >= low) & (v < high))
-            scores = gvs(off[of], np.zeros(101), "offset_removed")
+            indices = np.flatnonzero((v >= low) & (v < high))
+            scores = gvs(off[indices], np.zeros(101), "offset_removed")
             spread = [
                 reference_at_speed(None, float(x), adult_reference()).spreads["offset_removed"][variable]
-                for x in v[of]
+                for x in v[indices]
             ]
             beyond = 100.0 * float(
-                np.mean([s > told.p95_deg for s, told in zip(scores, spread, strict=True)])
+                np.mean([s > notices.p95_deg for s, notices in zip(scores, spread, strict=True)])
             )
             usual = adult_reference().spreads["offset_removed"][variable].p95_deg
             beyond_fixed = 100.0 * float(np.mean(scores > usual))
@@ -150,20 +150,20 @@ def test_scores_of_people_left_out_spread_as_the_reference_says() -> None:
 @cache
 def other_sets() -> dict[str, dict[str, Floats]]:
     """Curves by set and condition, in the signs of the product."""
-    found: dict[str, dict[str, list[tuple[float, float]]]] = {}
+    result: dict[str, dict[str, list[tuple[float, float]]]] = {}
     for name, keep in (("schwartz2008", None), ("bovi2011", "adult_22_72")):
         with (data_folder("norms") / f"kinematics_{name}.csv").open(encoding="utf-8") as file:
             for r in csv.DictReader(file):
                 if keep is None or r["group"] == keep:
-                    at = found.setdefault(f"{name} {r['condition']}", {}).setdefault(r["variable"], [])
+                    position = result.setdefault(f"{name} {r['condition']}", {}).setdefault(r["variable"], [])
                     sign = -1.0 if (name, r["variable"]) == ("bovi2011", "pelvis_tilt") else 1.0
-                    at.append((float(r["pct_cycle"]), sign * float(r["mean_deg"])))
+                    position.append((float(r["pct_cycle"]), sign * float(r["mean_deg"])))
     return {
         condition: {
             variable: np.interp(np.arange(101), *np.array(sorted(points)).T)
             for variable, points in own.items()
         }
-        for condition, own in found.items()
+        for condition, own in result.items()
     }
 
 
@@ -179,9 +179,9 @@ def test_other_laboratories_slow_walks_are_met_from_their_own_comfortable_ones()
         for variable, limit in CROSS_LIMIT_DEG.items():
             base, target = sets[usual][variable], sets[slow][variable]
             moved = move_curve(base, curve_models()[variable], v, v0)
-            before, after = (float(np.sqrt(np.mean((x - target) ** 2))) for x in (base, moved))
-            cells.append(f"{before:.1f} → {after:.1f}")
-            assert after < min(before, limit), (title, variable)
+            initial, final = (float(np.sqrt(np.mean((x - target) ** 2))) for x in (base, moved))
+            cells.append(f"{initial:.1f} → {final:.1f}")
+            assert final < min(initial, limit), (title, variable)
         rows.append([title, *cells])
     record(
         "Norm at the person's speed: other laboratories",

@@ -1,7 +1,7 @@
-"""Mistakes of a clinic on a right take: what is told, what is repaired, and what it costs the angles shown.
+"""Typical clinic mistakes on a correct trial: notices, corrections, and remaining angle errors.
 
-The whole chain from the common axis on runs on the take with one mistake and is held against itself without
-it. Nothing that costs more than `MOST_DEG` may stay untold (docs/science/agreement.md).
+The whole chain from the common axis on runs with one mistake and is compared with the result without it. No
+error above `MOST_DEG` may go unreported (docs/science/agreement.md).
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def remount(segment: Segment, turn: Floats) -> Make:
 
     def made(recording: UniformRecording) -> UniformRecording:
         x, q = recording.sensors[segment], exp(turn)
-        other = replace(x, acc=rotate(q, x.acc), gyr=rotate(q, x.gyr), mag=None)
-        return replace(recording, sensors={**recording.sensors, segment: other})
+        other_variant = replace(x, acc=rotate(q, x.acc), gyr=rotate(q, x.gyr), mag=None)
+        return replace(recording, sensors={**recording.sensors, segment: other_variant})
 
     return made
 
@@ -113,8 +113,8 @@ def tilt_pelvis(by_deg: float) -> Make:
         acc = recording.sensors["pelvis"].acc
         up = np.median(acc, axis=0) / np.linalg.norm(np.median(acc, axis=0))
         level = acc - np.outer(acc @ up, up)
-        across = np.cross(up, np.linalg.eigh(np.cov(level.T))[1][:, -1])
-        return slip_sensor(recording, "pelvis", np.radians(by_deg), find_middle(recording), across)
+        lateral = np.cross(up, np.linalg.eigh(np.cov(level.T))[1][:, -1])
+        return slip_sensor(recording, "pelvis", np.radians(by_deg), find_middle(recording), lateral)
 
     return made
 
@@ -160,25 +160,25 @@ class Outcome:
     worst_deg: float | None
 
 
-def warnings_of(found: TakeAnalysis) -> frozenset[str]:
-    return frozenset(n.code for n in found.notices if n.severity != "info")
+def warnings_of(result: TakeAnalysis) -> frozenset[str]:
+    return frozenset(n.code for n in result.notices if n.severity != "info")
 
 
 def judge(name: str, make: Make) -> Outcome:
     right = clean(name)
-    found = resume(replace(right, uniform=make(right.recording)), "agreement")
-    told = warnings_of(found) - warnings_of(right)
-    if found.angles is None:
-        return Outcome(told, None)
+    resumed_run = resume(replace(right, uniform=make(right.recording)), "agreement")
+    notices = warnings_of(resumed_run) - warnings_of(right)
+    if resumed_run.angles is None:
+        return Outcome(notices, None)
     assert right.angles is not None
     worst = None
     for angle, x in right.angles.angles.items():
-        if ("flexion" in angle or "dorsiflexion" in angle) and angle in found.angles.angles:
-            off = np.degrees(found.angles.angles[angle] - x)
+        if ("flexion" in angle or "dorsiflexion" in angle) and angle in resumed_run.angles.angles:
+            off = np.degrees(resumed_run.angles.angles[angle] - x)
             off = off[np.isfinite(off)]
             rms = float(np.sqrt(np.mean(off**2))) if len(off) else 0.0
             worst = rms if worst is None else max(worst, rms)
-    return Outcome(told, worst)
+    return Outcome(notices, worst)
 
 
 def cases_of(name: str, kind: str) -> dict[str, Make]:
@@ -189,9 +189,9 @@ def cases_of(name: str, kind: str) -> dict[str, Make]:
 
 @cache
 def outcomes(name: str) -> Mapping[tuple[str, str], Outcome]:
-    """Of all cases where figures are written, else of a third of those that must be told: others a kind.
+    """All cases if figures are written, else a third of those that must be reported.
 
-    On the simulated person of a sixth, which leaves out what is told of the other sensors of the same kind.
+    For the simulated person a sixth, without other sensors of the same type.
     """
     return {
         (kind, case): judge(name, cases_of(name, kind)[case])
@@ -236,17 +236,17 @@ PEOPLE = [(name, 200 + k, (1.52, 1.66, 1.79, 1.93)[k % 4]) for k, name in enumer
 
 
 def test_right_walks_are_accused_of_nothing() -> None:
-    told = {}
+    notices = {}
     walks = {"neura_walk": clean("neura_walk").recording, "qmt_fullbody": qmt_take(QMT)}
     for name, seed, height in sample(PEOPLE, 3, 1):
         walks[f"{name}, {height} m"] = synchronise(
             seven(simulate_scenario(name, seed=seed, height_m=height).recording)
         )
     for name, walk in walks.items():
-        found = check_agreement(walk)
-        if found.recording is not walk or found.doubtful:
-            told[name] = [n.code for n in found.recording.notices]
-    assert told == {}
+        agreement = check_agreement(walk)
+        if agreement.recording is not walk or agreement.doubtful:
+            notices[name] = [n.code for n in agreement.recording.notices]
+    assert notices == {}
 
 
 def _list_outcomes(takes: tuple[str, ...]) -> list[list[str]]:
@@ -254,11 +254,11 @@ def _list_outcomes(takes: tuple[str, ...]) -> list[list[str]]:
     for kind in MUST | LISTED:
         row = [kind]
         for name in takes:
-            found = [outcomes(name)[kind, case] for case in cases_of(name, kind)]
-            codes = sorted(set().union(*(x.told for x in found)))
-            shown = [x.worst_deg for x in found if x.worst_deg is not None]
-            row.append(f"{sum(bool(x.told) for x in found)} of {len(found)}")
-            row.append(f"{max(shown):.1f}" if shown else "–")
+            result = [outcomes(name)[kind, case] for case in cases_of(name, kind)]
+            codes = sorted(set().union(*(x.told for x in result)))
+            visible_worst_degs = [x.worst_deg for x in result if x.worst_deg is not None]
+            row.append(f"{sum(bool(x.told) for x in result)} of {len(result)}")
+            row.append(f"{max(visible_worst_degs):.1f}" if visible_worst_degs else "–")
             if name == takes[0]:
                 row.insert(1, ", ".join(codes) or "–")
         rows.append(row)

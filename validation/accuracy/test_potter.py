@@ -53,22 +53,22 @@ def errors(angles: dict[str, Floats]) -> dict[str, tuple[float, float]]:
     truth = walk()
     out = {}
     for axis in ("FE", "IE", "AA"):
-        found = []
+        result = []
         for side in SIDES:
             true = np.degrees(truth.hip_flexion[side]) if axis == "FE" else 0.0
             e = angles[f"{axis} {side}"] - true
             slope = float(np.polyfit(truth.t_s / 3600.0, e, 1)[0])
-            found.append((float(np.sqrt(np.mean(e**2))), slope))
-        out[axis] = max(rms for rms, _ in found), float(np.mean([s for _, s in found]))
+            result.append((float(np.sqrt(np.mean(e**2))), slope))
+        out[axis] = max(rms for rms, _ in result), float(np.mean([s for _, s in result]))
     return out
 
 
 def test_tables_2_and_3_are_reproduced() -> None:
     p, angles = run(ErkfParams.paper())
-    found = errors(angles)
+    result = errors(angles)
     # one walk of 7 minutes leaves ±0.1 °/h of chance in a slope: the mean of three is held to the limit
-    again = [errors(run(ErkfParams.paper(), seed)[1]) for seed in (1, 2)]
-    slopes = {a: float(np.mean([e[a][1] for e in (found, *again)])) for a in found}
+    second_errors = [errors(run(ErkfParams.paper(), seed)[1]) for seed in (1, 2)]
+    slopes = {a: float(np.mean([e[a][1] for e in (result, *second_errors)])) for a in result}
     lengths, widths = walk().strides(p)
     true_lengths, true_widths = walk().strides()
     length, width = (lengths - true_lengths) * 1e3, (widths - true_widths) * 1e3
@@ -76,7 +76,7 @@ def test_tables_2_and_3_are_reproduced() -> None:
     misprint = errors(run(replace(ErkfParams.paper(), joint_axis_sd=radians(1.15) * 57.3))[1])
     rows = [["paper, Table 2", "0.17", "0.09", "0.08", "< 0.1"]]
     for name, e in (
-        ("ours", found),
+        ("ours", result),
         ("σ_JA 1.15 rad as printed", misprint),
         ("no joint and tilt corrections", raw),
     ):
@@ -94,11 +94,11 @@ def test_tables_2_and_3_are_reproduced() -> None:
     record_in_short(
         "Hip flexion / rotation / adduction of Potter's walker: RMS °",
         "0.17 / 0.09 / 0.08 (Potter's Table 2)",
-        " / ".join(f"{found[a][0]:.2f}" for a in ("FE", "IE", "AA")),
+        " / ".join(f"{result[a][0]:.2f}" for a in ("FE", "IE", "AA")),
         f"simulation of the paper, {STRIDES} strides",
     )
     for axis, limit in (("FE", 0.20), ("IE", 0.11), ("AA", 0.10)):
-        assert found[axis][0] <= limit, axis
+        assert result[axis][0] <= limit, axis
         assert abs(slopes[axis]) < 0.15, axis
     assert np.sqrt(np.mean(length**2)) <= 10.0
     assert np.sqrt(np.mean(width**2)) <= 20.0

@@ -47,11 +47,11 @@ def vicon() -> JointAngles:
     n = len(ours.t_s)
     table = np.genfromtxt(data_folder("neura_walk") / "reference_angles.csv", delimiter=",", names=True)
     names = [name for name in table.dtype.names or () if name.endswith("_deg")]
-    found = {name.removesuffix("_deg"): np.radians(table[name])[:n] for name in names}
+    result = {name.removesuffix("_deg"): np.radians(table[name])[:n] for name in names}
     lag = min(
         LAGS,
         key=lambda k: sum(
-            float(np.std((np.roll(ours.angles[f"{v}_{s}"], -k) - found[f"{v}_{s}"])[WALK]))
+            float(np.std((np.roll(ours.angles[f"{v}_{s}"], -k) - result[f"{v}_{s}"])[WALK]))
             for v in SAGITTAL
             for s in "lr"
         ),
@@ -62,7 +62,7 @@ def vicon() -> JointAngles:
     for segment, (a, b) in MARKERS.items():
         along = (markers[b] - markers[a])[:n]
         courses[segment] = np.roll(np.unwrap(np.arctan2(along[:, 1], along[:, 0])), lag)
-    return JointAngles(ours.t_s, {k: np.roll(v, lag) for k, v in found.items()}, {}, headings=courses)
+    return JointAngles(ours.t_s, {k: np.roll(v, lag) for k, v in result.items()}, {}, headings=courses)
 
 
 @cache
@@ -71,8 +71,10 @@ def curves() -> tuple[CycleCurves, CycleCurves]:
     run = neura_analysis()
     assert run.angles is not None
     assert run.strides is not None
-    kept = tuple(replace(s, excluded_reason=None) for s in run.strides.strides if set(s.flags) <= STRAIGHT)
-    ours, true = (cycle_curves(angles, Strides(2 * kept)) for angles in (run.angles, vicon()))
+    retained = tuple(
+        replace(s, excluded_reason=None) for s in run.strides.strides if set(s.flags) <= STRAIGHT
+    )
+    ours, true = (cycle_curves(angles, Strides(2 * retained)) for angles in (run.angles, vicon()))
     missing = {v: ours.curves[v] for v in ("pelvis_tilt", "pelvis_obliquity")}
     return ours, CycleCurves({**missing, **true.curves}, true.stride_index, true.used, true.foot_off_pct)
 
@@ -98,20 +100,20 @@ def test_scores_agree_with_those_of_vicon() -> None:
         ("gps_sagittal shape", "gps_sagittal_deg", "offset_removed"),
         ("gps shape", "gps_deg", "offset_removed"),
     ):
-        shown = []
+        view = []
         for side in SIDES:
             a, b = (s.find(name, mode, side).value for s in (ours, true))  # type: ignore[arg-type]
             assert a is not None
             assert b is not None
             worst[label] = max(worst[label], abs(a - b))
-            shown.append(f"{a:.1f} / {b:.1f}")
-        rows.append([label, *shown, f"{LIMIT_DEG[label]:g}"])
+            view.append(f"{a:.1f} / {b:.1f}")
+        rows.append([label, *view, f"{LIMIT_DEG[label]:g}"])
         if label == "gps_sagittal raw":
-            told = [cell.split(" / ") for cell in shown]
+            parts = [cell.split(" / ") for cell in view]
             record_in_short(
                 "Sagittal score (GPS), left / right °",
-                " / ".join(vicon for _, vicon in told) + " (Vicon)",
-                " / ".join(own for own, _ in told),
+                " / ".join(vicon for _, vicon in parts) + " (Vicon)",
+                " / ".join(own for own, _ in parts),
                 "neura_walk, 1 person, anatomical zero",
             )
     for variable in NINE[2:]:

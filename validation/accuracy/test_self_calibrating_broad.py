@@ -1,4 +1,4 @@
-"""The self-calibrating filter on eight trials of BROAD, with vqf beside it, live and both ways."""
+"""Self-calibrating filter on eight trials of BROAD, live and smoothed, compared with vqf."""
 
 from __future__ import annotations
 
@@ -42,17 +42,17 @@ def test_the_mean_errors_are_within_their_limits(way: str) -> None:
 
 
 def test_the_stated_covariance_holds_the_errors_of_real_sensors() -> None:
-    """At nine of ten moments of every trial tilt and heading lie within the 95 % that is stated live."""
+    """Tilt and heading are within the stated 95 % for nine of ten moments of every trial."""
     for t in trials():
         run, step = SelfCalibratingFilter(t.rate_hz, magnetometer=True), round(t.rate_hz / 2)
         tilt, heading = [], []
         for k in range(0, len(t.gyr) - step, step):
             part = slice(k, k + step)
             q = run.advance(t.gyr[part, None], t.acc[part, None], t.mag[part, None])[-1, 0]
-            at = k + step - 1
-            if not t.moving[at] or not np.isfinite(t.reference[at]).all():
+            index = k + step - 1
+            if not t.moving[index] or not np.isfinite(t.reference[index]).all():
                 continue
-            e, P = log(multiply(t.reference[at], conjugate(q))), run.estimates.orientation_covariance[0]
+            e, P = log(multiply(t.reference[index], conjugate(q))), run.estimates.orientation_covariance[0]
             tilt.append(float(e[:2] @ np.linalg.solve(P[:2, :2], e[:2])) < 5.99)
             heading.append(e[2] ** 2 / P[2, 2] < 3.84)
         assert np.mean(tilt) >= 0.89, t.name
@@ -77,12 +77,12 @@ def test_what_the_device_taught_elsewhere_helps_live() -> None:
         matrices.append(run.estimates.gyro_matrix)
     taught = []
     for k, t in enumerate(trials()):
-        others = np.median([m for j, m in enumerate(matrices) if j != k], axis=0)
-        run = SelfCalibratingFilter(t.rate_hz, magnetometer=True, gyro_matrix=others)
+        remaining = np.median([m for j, m in enumerate(matrices) if j != k], axis=0)
+        run = SelfCalibratingFilter(t.rate_hz, magnetometer=True, gyro_matrix=remaining)
         taught.append(errors_deg(run.advance(t.gyr[:, None], t.acc[:, None], t.mag[:, None])[:, 0], t))
     rows = [
-        [t.name, _words(alone), _words(led)]
-        for t, alone, led in zip(trials(), ours("live"), taught, strict=True)
+        [t.name, _words(single), _words(led)]
+        for t, single, led in zip(trials(), ours("live"), taught, strict=True)
     ]
     rows.append(["mean", _words(ours("live").mean(axis=0)), _words(np.mean(taught, axis=0))])
     record(
@@ -119,10 +119,10 @@ def test_write_down_the_figures() -> None:
         "fast translation both ways are not as good as vqf's (docs/science/self-calibrating-filter.md).",
     )
     assert ours("live").mean(axis=0)[0] < columns[0].mean(axis=0)[0]
-    found = {t.name[:2]: [c[k] for c in columns] for k, t in enumerate(trials())}
-    assert found["16"][1][2] < found["16"][0][2] + 0.02  # fast translation, inclination live
-    assert found["16"][1][0] < found["16"][0][0] + 0.02  # and total
-    assert found["24"][3][1] < found["24"][2][1]  # tapping, heading both ways
+    result = {t.name[:2]: [c[k] for c in columns] for k, t in enumerate(trials())}
+    assert result["16"][1][2] < result["16"][0][2] + 0.02  # fast translation, inclination live
+    assert result["16"][1][0] < result["16"][0][0] + 0.02  # and total
+    assert result["24"][3][1] < result["24"][2][1]  # tapping, heading both ways
 
 
 def _words(errors: Floats) -> str:

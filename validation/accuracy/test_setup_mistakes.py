@@ -1,8 +1,7 @@
-"""Mistakes in the set-up: which are found and put right, on simulated patients and on real recordings.
+"""Set-up mistakes: detection and correction on simulated patients and real recordings.
 
-What an analysis decides on is looked at without the rest of it: a repair applied makes the samples what they
-were, to the bit, so the angles are those of the right take. All cases take ten minutes and more and are run
-with `--write-figures`; otherwise a sample of them is.
+Only the deciding parts of an analysis run: a correction restores the samples bit for bit, hence the correct
+angles. All cases take over ten minutes and run with `--write-figures`; otherwise a sample does.
 """
 
 from __future__ import annotations
@@ -50,14 +49,14 @@ def right(name: str) -> Recording:
     if name == "neura_walk":
         return seven(neura_recording())
     if name == "qmt_fullbody":
-        found = qmt_take(QMT).sensors
+        sensors = qmt_take(QMT).sensors
         streams = {
             x.device_id: ImuStream(
                 x.device_id, name, np.arange(len(x.acc)) / 100.0, x.acc, x.gyr, None, None, 100.0, "device", s
             )
-            for s, x in found.items()
+            for s, x in sensors.items()
         }
-        return Recording(streams, {x.device_id: s for s, x in found.items()})
+        return Recording(streams, {x.device_id: s for s, x in sensors.items()})
     return seven(simulate_scenario(name, seed=5).recording)
 
 
@@ -126,7 +125,7 @@ def _turn_all(recording: Recording, rng: np.random.Generator) -> Recording:
 
 
 def judge(name: str, make: Make, harmless: bool) -> str:
-    """`right`: put right, or nothing to be said; `told`: no repair is proposed; `silent`; `wrong`."""
+    """`right`: corrected, or nothing to report; `told`: reported without a proposal; `silent`; `wrong`."""
     wrong = make(right(name))
     repair, exchange = look_at(wrong)
     for _ in range(2):
@@ -138,34 +137,36 @@ def judge(name: str, make: Make, harmless: bool) -> str:
         return "told"
     swap = () if exchange is None else exchange.swap
     stated = {s: d for d, s in wrong.segments.items() if s is not None}
-    worn = undo_exchange(swap, stated)
+    segments = undo_exchange(swap, stated)
     devices = {s: d for d, s in right(name).segments.items() if s is not None}
     if harmless:
-        return "right" if worn == devices and repair is None and stated == devices else "wrong"
-    same = worn == devices and all(_is_alike(wrong.streams[d], right(name).streams[d]) for d in worn.values())
+        return "right" if segments == devices and repair is None and stated == devices else "wrong"
+    same = segments == devices and all(
+        _is_alike(wrong.streams[d], right(name).streams[d]) for d in segments.values()
+    )
     if same:
         return "right"
     return "silent" if wrong is not None and _is_untouched(wrong, make(right(name))) and not swap else "wrong"
 
 
-def _is_alike(found: ImuStream, true: ImuStream) -> bool:
+def _is_alike(result: ImuStream, true: ImuStream) -> bool:
     """Whether two streams differ by a turn of the whole sensor alone."""
-    assert found.gyr is not None
+    assert result.gyr is not None
     assert true.gyr is not None
-    good = np.isfinite(found.acc).all(axis=1) & np.isfinite(found.gyr).all(axis=1)
-    turn = np.linalg.lstsq(true.acc[good], found.acc[good], rcond=None)[0]
+    good = np.isfinite(result.acc).all(axis=1) & np.isfinite(result.gyr).all(axis=1)
+    turn = np.linalg.lstsq(true.acc[good], result.acc[good], rcond=None)[0]
     return bool(
         np.linalg.det(turn) > 0.99
         and np.allclose(turn @ turn.T, np.eye(3), atol=1e-6)
-        and np.allclose(true.gyr[good] @ turn, found.gyr[good], atol=1e-6)
+        and np.allclose(true.gyr[good] @ turn, result.gyr[good], atol=1e-6)
     )
 
 
-def _is_untouched(found: Recording, given: Recording) -> bool:
-    return found.segments == given.segments and all(
-        np.array_equal(found.streams[d].acc, x.acc, equal_nan=True)
-        and np.array_equal(found.streams[d].gyr, x.gyr, equal_nan=True)  # type: ignore[arg-type]
-        for d, x in given.streams.items()
+def _is_untouched(result: Recording, inputs: Recording) -> bool:
+    return result.segments == inputs.segments and all(
+        np.array_equal(result.streams[d].acc, x.acc, equal_nan=True)
+        and np.array_equal(result.streams[d].gyr, x.gyr, equal_nan=True)  # type: ignore[arg-type]
+        for d, x in inputs.streams.items()
     )
 
 
@@ -176,19 +177,19 @@ def test_a_sample_of_mistakes_is_never_put_right_wrongly() -> None:
     for name in SAMPLE:
         for kind, cases in list_cases(7).items():
             k = (len(kind) + len(name)) % len(cases)
-            found = judge(name, cases[k], kind in HARMLESS)
-            assert found != "wrong", (name, kind, k)
+            result = judge(name, cases[k], kind in HARMLESS)
+            assert result != "wrong", (name, kind, k)
 
 
 def test_right_set_ups_are_accused_of_nothing() -> None:
-    told = {w: look_at(ipol_recording(w))[0] for w in sample(WALKS, 5)}
-    assert {w: x.evidence for w, x in told.items() if x is not None} == {}
+    notices = {w: look_at(ipol_recording(w))[0] for w in sample(WALKS, 5)}
+    assert {w: x.evidence for w, x in notices.items() if x is not None} == {}
 
 
-def rms_of_angles(found: TakeAnalysis, true: TakeAnalysis) -> float:
-    assert found.angles is not None
+def rms_of_angles(result: TakeAnalysis, true: TakeAnalysis) -> float:
+    assert result.angles is not None
     assert true.angles is not None
-    off = [np.degrees(found.angles.angles[k] - x) for k, x in true.angles.angles.items()]
+    off = [np.degrees(result.angles.angles[k] - x) for k, x in true.angles.angles.items()]
     return max(float(np.sqrt(np.nanmean(x**2))) for x in off)
 
 
@@ -212,8 +213,8 @@ def test_a_real_take_has_its_angles_back_once_the_repair_is_confirmed(make: Make
     assert stopped.problem is not None
     assert stopped.problem.code == "setup_wrong"
     assert stopped.setup is not None
-    again = analyse(apply_repair(wrong, stopped.setup))
-    assert rms_of_angles(again, analyse_right("neura_walk")) < AT_MOST_DEG
+    second_analysis = analyse(apply_repair(wrong, stopped.setup))
+    assert rms_of_angles(second_analysis, analyse_right("neura_walk")) < AT_MOST_DEG
 
 
 @pytest.mark.timeout(3600)

@@ -39,7 +39,7 @@ def errors(name: str, seed: int) -> dict[str, Floats]:
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_flexion_stays_within_two_degrees_over_five_minutes(seed: int) -> None:
-    found = {k: rms_deg(e) for k, e in errors("five_minutes", seed).items()}
+    result = {k: rms_deg(e) for k, e in errors("five_minutes", seed).items()}
     if seed == 0:
         record(
             "Joint angles on simulated walks",
@@ -60,12 +60,12 @@ def test_flexion_stays_within_two_degrees_over_five_minutes(seed: int) -> None:
     for angles, limit in ((FLEXION, LIMIT_DEG), (FRONTAL, FRONTAL_LIMIT_DEG)):
         for angle in angles:
             for side in "rl":
-                assert found[f"{angle}_{side}"] <= limit, f"{angle} {side}: {found[f'{angle}_{side}']:.2f}"
+                assert result[f"{angle}_{side}"] <= limit, f"{angle} {side}: {result[f'{angle}_{side}']:.2f}"
 
 
 @pytest.mark.parametrize("name", ["comfortable", "slow", "fast_with_turns"])
 def test_flexion_stays_within_one_and_a_half_degrees_on_short_walks(name: str) -> None:
-    found = {k: rms_deg(e) for k, e in errors(name, 0).items()}
+    result = {k: rms_deg(e) for k, e in errors(name, 0).items()}
     for angle in FLEXION:
         for side in "rl":
-            assert found[f"{angle}_{side}"] <= 1.5, f"{angle} {side}: {found[f'{angle}_{side}']:.2f}"
+            assert result[f"{angle}_{side}"] <= 1.5, f"{angle} {side}: {result[f'{angle}_{side}']:.2f}"

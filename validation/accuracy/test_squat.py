@@ -36,40 +36,40 @@ PELVIS_WIDTHS = (1.05 * 0.137 * HEIGHT_M, 0.191 * HEIGHT_M)
 
 def errors_of_take(mounts: dict[Segment, Floats] | None = None, knee_hinge: bool = True) -> Floats:
     """RMS errors (7,) in degrees from standing, mean of four takes with noise and skin, both legs."""
-    found = []
+    results = []
     for seed in range(4):
         side = "left" if seed % 2 else "right"
         leg = measure_leg(HEIGHT_M, side)  # type: ignore[arg-type]
         squats = Squats(side=side, hinged=knee_hinge)  # type: ignore[arg-type]
         setup = RecordingSetup(tissue=SoftTissue())
-        made = simulate_squats(squats, HEIGHT_M, seed, setup, place_sensors(leg, HEIGHT_M))
+        result = simulate_squats(squats, HEIGHT_M, seed, setup, place_sensors(leg, HEIGHT_M))
         calibrated = calibrate_with_mounts(
-            synchronise(made.recording), mounts or make_fixed_mounts(leg.side), "fixed_offset", FIXED_OFFSET
+            synchronise(result.recording), mounts or make_fixed_mounts(leg.side), "fixed_offset", FIXED_OFFSET
         )
         angles = measure_angles(estimate_leg(calibrated, leg).orientations, calibrated.calibration.zero)
-        truth = made.truth.subtract_standing()
+        truth = result.truth.subtract_standing()
         names = [f"{joint}_{side[0]}" for joint in JOINTS]
         off = [angles.angles[n] - truth[n][: len(angles.t_s)] for n in names]
-        found.append(np.degrees(np.sqrt(np.nanmean(np.square(off), axis=1))))
-    return np.asarray(np.mean(found, axis=0))
+        results.append(np.degrees(np.sqrt(np.nanmean(np.square(off), axis=1))))
+    return np.asarray(np.mean(results, axis=0))
 
 
 def test_angles_of_squats() -> None:
-    made, leg, worn = squat_on(), measure_leg(HEIGHT_M, "right"), make_fixed_mounts("right")
+    simulation, leg, segments = squat_on(), measure_leg(HEIGHT_M, "right"), make_fixed_mounts("right")
 
     def turn(axis: int, deg: float) -> Floats:
-        turned = to_matrix(about(axis, radians(deg))) @ worn[SHANK["right"]]
-        return run(made, leg, {**worn, SHANK["right"]: turned})
+        turned = to_matrix(about(axis, radians(deg))) @ segments[SHANK["right"]]
+        return run(simulation, leg, {**segments, SHANK["right"]: turned})
 
-    exact, tilted, biased = run(made, leg), turn(2, 5.0), run(made, leg, bias_deg=0.3)
+    exact, tilted, biased = run(simulation, leg), turn(2, 5.0), run(simulation, leg, bias_deg=0.3)
     assert (exact < LIMIT_DEG).all()
     assert 4.5 < tilted[2] < 5.5
     assert 4.5 < tilted[3] < 5.5
     assert 2.0 < biased[0] < 3.5
     assert biased[1:6].max() < 1.0
-    longer = run(made, replace(leg, tibia=1.05 * leg.tibia))
-    for other in (longer, *(run(made, replace(leg, pelvis_width=w)) for w in PELVIS_WIDTHS)):
-        assert np.abs(other - exact).max() < 0.05
+    longer = run(simulation, replace(leg, tibia=1.05 * leg.tibia))
+    for second in (longer, *(run(simulation, replace(leg, pelvis_width=w)) for w in PELVIS_WIDTHS)):
+        assert np.abs(second - exact).max() < 0.05
     rows = {
         "exact": exact,
         "gyroscopes 0.3 °/s off": biased,
@@ -105,26 +105,26 @@ def errors_of_both_legs(squats: Squats) -> tuple[Floats, list[float], list[float
     angles_off, depths_off, valgus_off = [], [], []
     for seed in range(3):
         setup = RecordingSetup(tissue=SoftTissue())
-        made = simulate_squats(squats, HEIGHT_M, seed, setup, place_as_agreed(HEIGHT_M, SIDES))
-        a = analyse(made.recording)
+        result = simulate_squats(squats, HEIGHT_M, seed, setup, place_as_agreed(HEIGHT_M, SIDES))
+        a = analyse(result.recording)
         assert a.squats is not None, a.problem
         assert a.angles is not None
-        truth, n = made.truth.subtract_standing(), len(a.angles.t_s)
+        truth, n = result.truth.subtract_standing(), len(a.angles.t_s)
         for leg in a.squats:
             end = leg.side[0]
-            counted = [r for r in leg.repetitions if r.excluded is None]
-            assert len(counted) == squats.repetitions
+            counted_strides = [r for r in leg.repetitions if r.excluded is None]
+            assert len(counted_strides) == squats.repetitions
             inside = np.zeros(n, bool)
-            for r in counted:
+            for r in counted_strides:
                 inside[r.first : r.last + 1] = True
             names = [f"{joint}_{end}" for joint in MEASURED]
             off = np.degrees([a.angles.angles[x][inside] - truth[x][:n][inside] for x in names])
             angles_off.append(np.sqrt(np.mean(off**2, axis=1)))
-            at, start = [r.bottom for r in counted], [r.first for r in counted]
-            depths = np.degrees(truth[f"knee_flexion_{end}"][at])
+            index, start = [r.bottom for r in counted_strides], [r.first for r in counted_strides]
+            depths = np.degrees(truth[f"knee_flexion_{end}"][index])
             depths_off += (leg.values["squat_depth_deg"] - depths).tolist()
             inward = truth[f"hip_adduction_{end}"] + truth[f"hip_rotation_{end}"]
-            inward = np.degrees(inward[at] - inward[start])
+            inward = np.degrees(inward[index] - inward[start])
             valgus_off += (leg.values["squat_knee_valgus_bottom_deg"] - inward).tolist()
     return np.mean(angles_off, axis=0), depths_off, valgus_off
 
@@ -195,8 +195,8 @@ def test_the_order_of_sensitivities_is_that_of_the_paper() -> None:
         largest.append(max(float(c.max()) for c in changes if c is not None))
     assert largest[0] > 10.0 * largest[1]
     assert largest == sorted(largest, reverse=True)
-    known = {name: r.sensitivity_pct for name, r in rows.items() if r.sensitivity_pct is not None}
-    ankle, knee, hip_flexion = ({n: float(v[i]) for n, v in known.items()} for i in (1, 3, 4))
+    known_by_name = {name: r.sensitivity_pct for name, r in rows.items() if r.sensitivity_pct is not None}
+    ankle, knee, hip_flexion = ({n: float(v[i]) for n, v in known_by_name.items()} for i in (1, 3, 4))
     assert max(ankle, key=ankle.__getitem__) == "Roll-tib"
     assert set(sorted(knee, key=knee.__getitem__)[-4:]) >= {"Yaw-tib", "Yaw-thi", "Roll-tib"}
     assert {"Roll-bac", "Yaw-thi"} <= set(sorted(hip_flexion, key=hip_flexion.__getitem__)[-4:])

@@ -1,6 +1,7 @@
-"""Steps of one lower-back sensor on ipol_walks, against the contacts of the feet that people checked.
+"""Steps of one lower-back sensor on ipol_walks against manually checked foot contacts.
 
-The walks have a turn, in which steps are easily missed; the feet before and after it are told on their own.
+The walks contain a turn, in which steps are easily missed; sides before and after it are determined
+separately.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ WINDOW_S = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Steps of one walk against the checked contacts: pairs, number, told feet and how many are right."""
+    """Steps of one walk against the checked contacts: pairs, number, reported and correct sides."""
 
     score: Score
     steps: int
@@ -41,13 +42,15 @@ def found(walk: str) -> Found:
     off, events = first_s(recording), checked_events(walk)
     true = sorted((float(t) - off, side) for side, times in events.contacts.items() for t in times)
     steps = detect_steps(synchronise(recording)).steps
-    told = right = 0
+    is_reported = right = 0
     for step in steps:
         time, side = min(true, key=lambda x: abs(x[0] - step.time_s))
         if step.side is not None and abs(time - step.time_s) <= WINDOW_S:
-            told += 1
+            is_reported += 1
             right += step.side == side
-    return Found(match([s.time_s for s in steps], [t for t, _ in true], WINDOW_S), len(steps), told, right)
+    return Found(
+        match([s.time_s for s in steps], [t for t, _ in true], WINDOW_S), len(steps), is_reported, right
+    )
 
 
 def test_the_steps_are_those_of_the_feet() -> None:
@@ -56,24 +59,24 @@ def test_the_steps_are_those_of_the_feet() -> None:
 
 
 def test_a_foot_that_is_told_is_the_right_one() -> None:
-    told = sum(found(w).told for w in WALKS)
-    assert told >= 300
-    assert sum(found(w).right for w in WALKS) >= 0.99 * told
+    total = sum(found(w).told for w in WALKS)
+    assert total >= 300
+    assert sum(found(w).right for w in WALKS) >= 0.99 * total
 
 
 def test_the_figures_are_in_the_document() -> None:
     rows = []
     for person in ("11", "12", "13", "14"):
-        of = [found(w) for w in WALKS if w.startswith(person)]
-        errors = 1e3 * np.concatenate([x.score.errors for x in of])
+        source = [found(w) for w in WALKS if w.startswith(person)]
+        errors = 1e3 * np.concatenate([x.score.errors for x in source])
         rows.append([
             person,
-            str(len(of)),
-            f"{np.mean([x.f1 for x in of]):.2f}",
-            f"{min(x.f1 for x in of):.2f}",
+            str(len(source)),
+            f"{np.mean([x.f1 for x in source]):.2f}",
+            f"{min(x.f1 for x in source):.2f}",
             f"{errors.mean():+.0f} ± {errors.std(ddof=1):.0f}",
-            f"{100 * sum(x.told for x in of) / sum(x.steps for x in of):.0f}",
-            f"{sum(x.right for x in of)}/{sum(x.told for x in of)}",
+            f"{100 * sum(x.told for x in source) / sum(x.steps for x in source):.0f}",
+            f"{sum(x.right for x in source)}/{sum(x.told for x in source)}",
         ])  # fmt: skip
     record(
         "Steps of one lower-back sensor on ipol_walks",

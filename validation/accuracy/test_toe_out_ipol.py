@@ -1,7 +1,7 @@
-"""Toe-out of the same four people in walk after walk: ipol_walks, from both feet alone.
+"""Toe-out of four people over repeated walks: ipol_walks, from both feet alone.
 
-Nobody measured it, but a person's toe-out hardly changes from one walk to the next: what differs is mostly
-how the forward axes of the feet were found, which a standing and a walk there and back show anew each time.
+No reference exists, but toe-out of a person hardly changes between walks, so differences mostly come from the
+estimated anterior axes of the feet.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ SPREAD_DEG = 5.0
 
 @cache
 def toe_out(walk: str) -> dict[Side, float]:
-    """Mean of a walk in degrees by side, where it is told."""
-    found = ipol_analysis(walk, *FEET).parameters
-    return {p.side: p.mean for p in found if p.name == "toe_out_deg" and p.side and p.mean is not None}
+    """Mean of a walk in degrees by side, where available."""
+    parameters = ipol_analysis(walk, *FEET).parameters
+    return {p.side: p.mean for p in parameters if p.name == "toe_out_deg" and p.side and p.mean is not None}
 
 
 def of_subject(subject: str, side: Side) -> Floats:

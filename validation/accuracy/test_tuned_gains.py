@@ -1,4 +1,4 @@
-"""Shipped gains beside the defaults: on walkers they were fitted to, on others, on real optical segments."""
+"""Shipped gains compared with defaults: on fitted walkers, on others, on real optical segments."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ def on_walkers(
     name: str, place: BodyPlace, people: tuple[Person, ...], gains: AlgorithmGains | None
 ) -> float:
     """Mean RMS inclination in degrees."""
-    found = []
+    result = []
     for person in people:
         walk = trial(person, place)
         q = run_trial(name, walk, gains, magnetometer=False)
-        found.append(math.degrees(score_orientation(q, walk).inclination))
-    return float(np.mean(found))
+        result.append(math.degrees(score_orientation(q, walk).inclination))
+    return float(np.mean(result))
 
 
 def on_people(
     name: str, place: BodyPlace, trials: tuple[SegmentTrial, ...], gains: AlgorithmGains | None
 ) -> float | None:
     """The same on real segments; None where the recording has none there."""
-    found = [
+    degrees = [
         math.degrees(inclination_rms(run_trial(name, t.trial, gains, magnetometer=False), t))
         for t in trials
         if t.placement == place
     ]
-    return float(np.mean(found)) if found else None
+    return float(np.mean(degrees)) if degrees else None
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -50,8 +50,8 @@ def test_tuned_gains_are_better_on_people_they_were_not_fitted_to(name: str) -> 
     for place in PLACEMENTS:
         gains = TUNED_ON_WALKERS.get((name, place))
         if gains is not None:
-            before, after = (on_walkers(name, place, CHECKED, g) for g in (None, gains))
-            assert after < before, place
+            initial, final = (on_walkers(name, place, CHECKED, g) for g in (None, gains))
+            assert final < initial, place
 
 
 def test_what_they_do_on_real_recordings_is_written_down() -> None:
@@ -67,10 +67,10 @@ def test_what_they_do_on_real_recordings_is_written_down() -> None:
                 for people in (FITTED, CHECKED)
             ]
             for real in (neura_segments(), gaitmap_feet()):
-                before, after = (on_people(name, place, real, g) for g in (None, gains))
-                row.append(_pair(before, after))
-                if before is not None and after is not None:
-                    assert after < before + WORSE_DEG, (name, place)
+                initial, final = (on_people(name, place, real, g) for g in (None, gains))
+                row.append(_pair(initial, final))
+                if initial is not None and final is not None:
+                    assert final < initial + WORSE_DEG, (name, place)
             rows.append(row)
     record(
         "Tuned gains on walking",
@@ -88,5 +88,5 @@ def test_what_they_do_on_real_recordings_is_written_down() -> None:
     )
 
 
-def _pair(before: float | None, after: float | None) -> str:
-    return "–" if before is None or after is None else f"{before:.2f} → {after:.2f}"
+def _pair(earlier: float | None, later: float | None) -> str:
+    return "–" if earlier is None or later is None else f"{earlier:.2f} → {later:.2f}"

@@ -1,7 +1,7 @@
-"""Turns and stops of 22 walks there and back against what people say of them: ipol_walks.
+"""Turns and stops of the 22 ipol_walks against manual annotations.
 
-The edges of these turns were set by the authors on the lower back. Half the turn's height was chosen because
-a low-pass filter keeps it, not on these; that the turns agree is the test.
+Turn limits were annotated by the authors on the lower back. Half of the turn's height was chosen because a
+low-pass filter preserves it, not on these data.
 """
 
 from __future__ import annotations
@@ -21,46 +21,49 @@ WORN: dict[str, tuple[Segment, ...]] = {"lower back": ("pelvis",), "both feet": 
 EDGE_S = 0.2
 
 
-def edge_errors(worn: str) -> Floats:
+def edge_errors(segments: str) -> Floats:
     """(walks, 2) begin and end of the turn minus those of the people, s."""
     errors = []
     for walk in WALKS:
-        measured, off = ipol_analysis(walk, *WORN[worn]).measured, first_s(ipol_recording(walk, *WORN[worn]))
+        measured, off = (
+            ipol_analysis(walk, *WORN[segments]).measured,
+            first_s(ipol_recording(walk, *WORN[segments])),
+        )
         assert measured is not None
         true = np.array(checked_events(walk).turn_s)
-        found = [np.array((t.start_s, t.end_s)) + off for t in measured.turns]
-        errors.append(min((t - true for t in found), key=lambda e: float(np.abs(e).max())))
+        result = [np.array((t.start_s, t.end_s)) + off for t in measured.turns]
+        errors.append(min((t - true for t in result), key=lambda e: float(np.abs(e).max())))
     return np.array(errors)
 
 
-def stops(worn: str) -> int:
-    """Walks in which a stop is told."""
-    found = [ipol_analysis(walk, *WORN[worn]).measured for walk in WALKS]
-    return sum(any(b.stops for b in m.bouts) for m in found if m is not None)
+def stops(segments: str) -> int:
+    """Walks with a reported stop."""
+    measureds = [ipol_analysis(walk, *WORN[segments]).measured for walk in WALKS]
+    return sum(any(b.stops for b in m.bouts) for m in measureds if m is not None)
 
 
 def test_a_turn_begins_and_ends_within_a_fifth_of_a_second() -> None:
-    for worn in WORN:
-        assert np.abs(edge_errors(worn)).max() < EDGE_S
+    for segments in WORN:
+        assert np.abs(edge_errors(segments)).max() < EDGE_S
 
 
 def test_nobody_is_told_to_have_stopped() -> None:
-    assert [stops(worn) for worn in WORN] == [0, 0]
+    assert [stops(segments) for segments in WORN] == [0, 0]
 
 
 def test_the_figures_are_in_the_document() -> None:
     rows = []
-    for worn in WORN:
-        e = edge_errors(worn)
+    for segments in WORN:
+        e = edge_errors(segments)
         subjects = [w.split("-")[0] for w in WALKS]
-        by = [e[[s == x for x in subjects]].mean(axis=0) for s in sorted(set(subjects))]
+        by_key = [e[[s == x for x in subjects]].mean(axis=0) for s in sorted(set(subjects))]
         rows.append([
-            worn,
+            segments,
             *(f"{e[:, i].mean():+.2f} ± {e[:, i].std(ddof=1):.2f}" for i in range(2)),
             f"{np.diff(e, axis=1).mean():+.2f}",
             f"{np.abs(e).max():.2f}",
-            f"{np.abs(by).max():.2f}",
-            str(stops(worn)),
+            f"{np.abs(by_key).max():.2f}",
+            str(stops(segments)),
         ])  # fmt: skip
     record(
         "Turns and stops on ipol_walks",
@@ -76,8 +79,8 @@ def test_the_figures_are_in_the_document() -> None:
 def test_virtual_patients_stop_once_and_are_told_to(worn: tuple[Segment, ...]) -> None:
     for name in ("healthy_slow", "hemiparetic", "drop_foot", "parkinson", "antalgic", "elderly"):
         take = simulate_scenario(name, 3)
-        kept = {d: s if s in worn else None for d, s in take.recording.segments.items()}
-        measured = analyse(replace(take.recording, segments=kept)).measured
+        retained = {d: s if s in worn else None for d, s in take.recording.segments.items()}
+        measured = analyse(replace(take.recording, segments=retained)).measured
         assert measured is not None
         (stop,) = [s for b in measured.bouts for s in b.stops]
         middle = take.truth.stands[1]

@@ -36,13 +36,13 @@ Pair = tuple[Parameter, float]
 
 
 def of_people(name: str) -> list[Pair]:
-    _, true, found = measured_walk(name)
+    _, true, result = measured_walk(name)
     truth = {(p.name, p.side): p.mean for p in true.parameters}
     pairs = []
-    for p in found.parameters:
-        known = truth.get((p.name, p.side))
-        if p.uncertainty is not None and known is not None and p.name not in OTHER_ZERO:
-            pairs.append((p, known))
+    for p in result.parameters:
+        known_response = truth.get((p.name, p.side))
+        if p.uncertainty is not None and known_response is not None and p.name not in OTHER_ZERO:
+            pairs.append((p, known_response))
     return pairs
 
 
@@ -66,9 +66,9 @@ def of_distances() -> list[Pair]:
     ours, vicon = distances.figures()
     pairs = []
     for name in distances.LIMIT_CM:
-        known = np.isfinite(ours[name] + vicon[name])
-        found = summarise_values(name, None, ours[name][known], CATALOGUE[name].unit)
-        pairs.append((state_uncertainty([found])[0], float(vicon[name][known].mean())))
+        known_finite = np.isfinite(ours[name] + vicon[name])
+        values = summarise_values(name, None, ours[name][known_finite], CATALOGUE[name].unit)
+        pairs.append((state_uncertainty([values])[0], float(vicon[name][known_finite].mean())))
     return pairs
 
 
@@ -80,7 +80,7 @@ def of_gaitmap() -> list[Pair]:
     columns, strides = run.measured.columns, run.measured.strides.strides
     pairs = []
     for side in SIDES:
-        seen: dict[str, list[tuple[float, float]]] = {}
+        observations: dict[str, list[tuple[float, float]]] = {}
         for true, row in zip(true_strides(side), reference_strides(side), strict=True):
             for i, s in enumerate(strides):
                 near = abs(s.start_s - true.first_ic_s) < 0.05 and abs(s.end_s - true.last_ic_s) < 0.05
@@ -92,20 +92,22 @@ def of_gaitmap() -> list[Pair]:
                 truth |= {"gait_speed_mps": true.length_m / time}
                 if 0.0 < stance < time:
                     truth |= {"stance_time_s": stance, "stance_pct": 100.0 * stance / time}
-                for name, known in truth.items():
+                for name, reference in truth.items():
                     value = columns[name][i]
                     if value is not None:
-                        seen.setdefault(name, []).append((value, known))
-        pairs += _of_side(side, seen, run.events)
+                        observations.setdefault(name, []).append((value, reference))
+        pairs += _of_side(side, observations, run.events)
     return pairs
 
 
-def _of_side(side: Side, seen: dict[str, list[tuple[float, float]]], events: GaitEvents | None) -> list[Pair]:
+def _of_side(
+    side: Side, observations: dict[str, list[tuple[float, float]]], events: GaitEvents | None
+) -> list[Pair]:
     values = [
-        summarise_values(name, side, [a for a, _ in both], CATALOGUE[name].unit)
-        for name, both in seen.items()
+        summarise_values(name, side, [a for a, _ in pair], CATALOGUE[name].unit)
+        for name, pair in observations.items()
     ]
-    truth = [float(np.mean([b for _, b in both])) for both in seen.values()]
+    truth = [float(np.mean([b for _, b in pair])) for pair in observations.values()]
     return list(zip(state_uncertainty(values, events), truth, strict=True))
 
 

@@ -1,7 +1,7 @@
-"""What the whole chain tells of the virtual people beside what they did: figures for validation/report.md.
+"""Results of the whole chain on virtual people against their truth: figures for validation/report.md.
 
-A deviation that the analysis loses, exaggerates or invents would show here; how well it does on patients does
-not (docs/science/simulation.md).
+Deviations that the analysis loses, exaggerates or invents appear here; accuracy on patients does not
+(docs/science/simulation.md).
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ def true(truth: WalkTruth, side: Side) -> Told:
     return Told(*(float(np.mean(x)) for x in (steps, stances, peaks, times)))
 
 
-def told(found: TakeAnalysis, side: Side) -> Told:
-    named = {p.name: p.mean for p in found.parameters if p.side == side}
+def told(result: TakeAnalysis, side: Side) -> Told:
+    named = {p.name: p.mean for p in result.parameters if p.side == side}
     values = []
     for name in ("step_length_m", "stance_pct", "knee_flexion_max_swing_deg", "stride_time_s"):
         value = named[name]
@@ -65,23 +65,23 @@ def told(found: TakeAnalysis, side: Side) -> Told:
 def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
     rows = []
     for name in WALKING:
-        made = simulate_scenario(name, SEED)
-        found = analyse(made.recording)
-        assert found.problem is None, name
-        did = {side: true(made.truth, side) for side in SIDES}
-        says = {side: told(found, side) for side in SIDES}
+        simulation = simulate_scenario(name, SEED)
+        analysis = analyse(simulation.recording)
+        assert analysis.problem is None, name
+        did = {side: true(simulation.truth, side) for side in SIDES}
+        says = {side: told(analysis, side) for side in SIDES}
         for side in SIDES:
             assert abs(says[side].step_m - did[side].step_m) < STEP_M, (name, side)
             assert abs(says[side].stance_pct - did[side].stance_pct) < STANCE_PCT, (name, side)
             assert abs(says[side].knee_deg - did[side].knee_deg) < KNEE_DEG, (name, side)
             assert abs(says[side].time_s - did[side].time_s) < TIME_S, (name, side)
-        for what in ("step_m", "stance_pct"):
-            ratio, real = (getattr(x["left"], what) / getattr(x["right"], what) for x in (says, did))
-            assert abs(ratio - real) < RATIO, (name, what)
+        for label in ("step_m", "stance_pct"):
+            ratio, real = (getattr(x["left"], label) / getattr(x["right"], label) for x in (says, did))
+            assert abs(ratio - real) < RATIO, (name, label)
         cells = [
-            f"{getattr(says['right'], what):{form}}/{getattr(says['left'], what):{form}} "
-            f"({getattr(did['right'], what):{form}}/{getattr(did['left'], what):{form}})"
-            for what, form in (
+            f"{getattr(says['right'], label):{form}}/{getattr(says['left'], label):{form}} "
+            f"({getattr(did['right'], label):{form}}/{getattr(did['left'], label):{form}})"
+            for label, form in (
                 ("step_m", ".2f"),
                 ("stance_pct", ".0f"),
                 ("knee_deg", ".0f"),
@@ -102,8 +102,8 @@ def test_what_is_told_of_each_person_is_what_the_person_did() -> None:
 
 @pytest.mark.parametrize("seed", [7, 8])
 def test_a_severe_shuffle_is_refused_and_not_guessed(seed: int) -> None:
-    found = analysed("severe_shuffle", seed)
-    assert "no_toe_off" in {n.code for n in found.notices}
-    figures = [p for p in found.parameters if p.name in ("stride_time_s", "stance_pct")]
+    result = analysed("severe_shuffle", seed)
+    assert "no_toe_off" in {n.code for n in result.notices}
+    figures = [p for p in result.parameters if p.name in ("stride_time_s", "stance_pct")]
     assert [(p.mean, p.reason) for p in figures] == [(None, "no_strides")] * len(figures)
     assert len(figures) >= 2

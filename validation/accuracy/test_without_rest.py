@@ -1,10 +1,9 @@
-"""Real walks with every rest cut out: the walk alone gives what the whole take gives.
+"""Real walks without any rest: the walk alone gives the results of the whole trial.
 
-Each take is cut to its longest stretch without a rest, 0.3 s from it, so that it begins and ends with the
-foot already on its way. The same chain then has nothing but the walk. How a foot stood is known no better
-than two standings of one take agree, and its pitch no better than its path fits its rests: foot strike is
-judged in takes whose standings agree within the limit at both feet and whose whole take withholds no
-distances, and over all takes in the mean.
+Each trial is cut to its longest stretch without a rest, 0.3 s from it, so it starts and ends in motion. Foot
+posture is known no better than two standings agree, and its pitch no better than its path fits its rests:
+foot strike is judged in trials whose standings agree within the limit at both feet and which suppress no
+distances, and over all trials in the mean.
 """
 
 from __future__ import annotations
@@ -36,8 +35,8 @@ def without_rest(recording: Recording) -> Recording:
     uniform = synchronise(recording)
     edges = [0.0, *(x for w in find_rest_windows(uniform) for x in w), float(uniform.t_s[-1])]
     start, end = max(zip(edges[::2], edges[1::2], strict=True), key=lambda x: x[1] - x[0])
-    worn = [s for d, s in recording.streams.items() if recording.segments.get(d) is not None]
-    first = max(float(s.t_s[0]) for s in worn)
+    segment_names = [s for d, s in recording.streams.items() if recording.segments.get(d) is not None]
+    first = max(float(s.t_s[0]) for s in segment_names)
     return cut_recording(recording, first + start + MARGIN_S, first + end - MARGIN_S)
 
 
@@ -68,10 +67,10 @@ class Pair:
 
     def means(self, name: str) -> list[float]:
         """Of the whole take, of the sides that `differences` has."""
-        both = {p.side for p in self.walk.parameters if p.name == name and p.mean is not None}
+        joint_sides = {p.side for p in self.walk.parameters if p.name == name and p.mean is not None}
         return [
             p.mean for p in self.whole.parameters
-            if p.name == name and p.mean is not None and p.side in both
+            if p.name == name and p.mean is not None and p.side in joint_sides
         ]  # fmt: skip
 
 
@@ -141,12 +140,12 @@ WORN: tuple[tuple[Segment, ...], ...] = (
 
 
 @cache
-def given(worn: tuple[Segment, ...]) -> frozenset[tuple[str, str | None]]:
+def given(segment_names: tuple[Segment, ...]) -> frozenset[tuple[str, str | None]]:
     """Parameters with a value of qmt_fullbody without rests and with some of its sensors."""
     recording = without_rest(read_take("qmt_fullbody"))
-    segments = {d: s if s in worn else None for d, s in recording.segments.items()}
-    found = analyse(replace(recording, segments=segments))
-    return frozenset((p.name, p.side) for p in found.parameters if p.mean is not None)
+    segments = {d: s if s in segment_names else None for d, s in recording.segments.items()}
+    analysis = analyse(replace(recording, segments=segments))
+    return frozenset((p.name, p.side) for p in analysis.parameters if p.mean is not None)
 
 
 OTHER_SOURCE = {"step_count", "step_time_cv_pct"}
@@ -178,8 +177,8 @@ def test_a_lower_back_alone_has_its_cadence_without_rest(trial: tuple[str, str])
     cut = cut_recording(recording, period.start_s, period.end_s + 0.3)
     if cut.streams["LowerBack"].t_s[-1] < 5.0:
         cut = cut_recording(recording, period.end_s - 5.2, period.end_s + 0.3)
-    found = {p.name: p.mean for p in analyse(cut).parameters}
-    assert found["cadence_spm"] == pytest.approx(period.cadence_spm, rel=0.05)
+    by_name = {p.name: p.mean for p in analyse(cut).parameters}
+    assert by_name["cadence_spm"] == pytest.approx(period.cadence_spm, rel=0.05)
 
 
 def test_write_down_the_figures() -> None:

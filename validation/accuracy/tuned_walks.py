@@ -81,7 +81,7 @@ def walk(person: Person) -> Simulation:
 
 def trial(person: Person, placement: BodyPlace) -> ReferenceTrial:
     """One sensor of a walk, its reference turned so that y is magnetic north."""
-    made = walk(person)
+    result = walk(person)
     legs: dict[BodyPlace, Segment] = {
         "foot": FOOT[person.side],
         "shank": SHANK[person.side],
@@ -89,13 +89,13 @@ def trial(person: Person, placement: BodyPlace) -> ReferenceTrial:
         "pelvis": "pelvis",
     }
     segment = legs[placement]
-    device = next(d for d, worn in made.recording.segments.items() if worn == segment)
-    stream = made.recording.streams[device]
+    device = next(d for d, segments in result.recording.segments.items() if segments == segment)
+    stream = result.recording.streams[device]
     assert stream.acc is not None
     assert stream.gyr is not None
     assert stream.mag is not None
-    q = made.sensor_q[segment]
-    field = rotate(q[0], made.ideal[segment].mag[0])
+    q = result.sensor_q[segment]
+    field = rotate(q[0], result.ideal[segment].mag[0])
     q = multiply(about(2, np.arctan2(field[0], field[1])), q)
     moving = np.arange(len(q)) >= REST_S * stream.rate_hz
     bias = np.random.default_rng((person.seed, PLACEMENTS.index(placement))).normal(0.0, LEFT_BIAS, 3)
@@ -103,17 +103,17 @@ def trial(person: Person, placement: BodyPlace) -> ReferenceTrial:
     return ReferenceTrial(person.name, stream.rate_hz, gyr, stream.acc, stream.mag, q, moving)
 
 
-def trial_file(made: ReferenceTrial) -> bytes:
+def trial_file(result: ReferenceTrial) -> bytes:
     """The trial as an .npz of the BROAD layout."""
     file = BytesIO()
     np.savez(
         file,
-        imu_gyr=made.gyr,
-        imu_acc=made.acc,
-        imu_mag=made.mag,
-        opt_quat=made.reference,
-        movement=made.moving,
-        sampling_rate=np.array(made.rate_hz),
+        imu_gyr=result.gyr,
+        imu_acc=result.acc,
+        imu_mag=result.mag,
+        opt_quat=result.reference,
+        movement=result.moving,
+        sampling_rate=np.array(result.rate_hz),
     )
     return file.getvalue()
 
@@ -124,8 +124,8 @@ def main(folder: Path) -> None:
         home.mkdir(parents=True, exist_ok=True)
         for prefix, people in (("fit", FITTED), ("check", CHECKED)):
             for person in people:
-                made = trial(person, placement)
-                (home / f"{prefix}_{person.name}.npz").write_bytes(trial_file(made))
+                result = trial(person, placement)
+                (home / f"{prefix}_{person.name}.npz").write_bytes(trial_file(result))
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""The ErKF as the paper writes it: whole matrices F, H and G, one stacked update per step, in plain numpy.
+"""ErKF as printed: whole matrices F, H and G, one stacked update per step, in plain numpy.
 
-The measurements, noise and rules are those of core/body/erkf/filter.py, none of its code: what the compiled
-loops must equal and beat. Equation numbers: Potter 2021.
+Measurements, noise and rules are those of core/body/erkf/filter.py, without its code: a reference for results
+and speed of the compiled loops. Equation numbers: Potter 2021.
 """
 
 from __future__ import annotations
@@ -98,8 +98,8 @@ class Textbook:
         """H (r, N), residual (r,) and variance of every measurement of sample k (eq 28 to 35)."""
         p, N = self.params, len(self.P)
         R = to_matrix(self.x[:, 6:10])
-        taken = [self.accepts(k, i) for i in range(len(self.x))]
-        found = []
+        selection = [self.accepts(k, i) for i in range(len(self.x))]
+        result = []
         for joint in self.tree.joints:
             i, j = joint.proximal, joint.distal
             ends = [] if p.joint_centre_sd is None else [(joint.r_proximal, joint.r_distal, True)]
@@ -113,18 +113,18 @@ class Textbook:
                     H[:, self.at(i, 0)], H[:, self.at(j, 0)] = EYE, -EYE
                     y = y + self.x[j, 0:3] - self.x[i, 0:3]
                     var = (p.joint_centre_sd or 0.0) ** 2 + self.second_order(R, i, j, a, b)
-                found.append((H, y, var))
+                result.append((H, y, var))
         for i in range(len(self.x)):
             f = self.inputs.acc[k, i]
-            if taken[i]:
+            if selection[i]:
                 H = np.zeros((3, N))
                 H[:, self.at(i, 3)] = EYE
-                found.append((H, -self.x[i, 3:6], p.zero_velocity_sd**2))
-            if p.tilt_sd is not None and (taken[i] or self.inputs.still[k, i]):
+                result.append((H, -self.x[i, 3:6], p.zero_velocity_sd**2))
+            if p.tilt_sd is not None and (selection[i] or self.inputs.still[k, i]):
                 H = np.zeros((3, N))
                 H[:, self.at(i, 6)] = skew(R[i].T @ UP)
-                found.append((H, f / np.linalg.norm(f) - R[i].T @ UP, p.tilt_sd**2))
-        return found
+                result.append((H, f / np.linalg.norm(f) - R[i].T @ UP, p.tilt_sd**2))
+        return result
 
     def second_order(self, R: Floats, i: int, j: int, a: Floats, b: Floats) -> float:
         """½ σ⁴ |r_xy|² of both levers for the variance σ² of the relative heading, ½ σ⁴ at most 1.5."""
@@ -139,8 +139,8 @@ class Textbook:
         if not self.inputs.contact[k, i]:
             self.refused[i] = 0
             return False
-        p, v, at = self.params, self.x[i, 3:6], self.at(i, 3)
-        S = self.P[at, at] + p.zero_velocity_sd**2 * EYE
+        p, v, index = self.params, self.x[i, 3:6], self.at(i, 3)
+        S = self.P[index, index] + p.zero_velocity_sd**2 * EYE
         if p.gate is None or v @ np.linalg.solve(S, v) <= p.gate:
             self.refused[i] = 0
             return True
@@ -148,7 +148,7 @@ class Textbook:
         if self.refused[i] < self.reaccept:
             return False
         self.P[self.at(i, 0), self.at(i, 0)] += p.reaccept_m**2 * EYE
-        self.P[at, at] += v @ v * EYE
+        self.P[index, index] += v @ v * EYE
         return True
 
     def inject(self, d: Floats) -> None:

@@ -43,10 +43,10 @@ def repeat(stream: LongStream, blocks: list[SampleBlock], times: int) -> LongStr
 
 @pytest.fixture(scope="module")
 def day() -> tuple[LongStream, list[SampleBlock]]:
-    made = simulate_daily_life(plan_daily_life(2.0, 4), 1.7, 4, RATE)
-    blocks = list(made.stream.open_blocks())
-    monitor_activity(repeat(made.stream, blocks[:20], 1), "chest", 1.7)
-    return made.stream, blocks
+    daily_life = simulate_daily_life(plan_daily_life(2.0, 4), 1.7, 4, RATE)
+    blocks = list(daily_life.stream.open_blocks())
+    monitor_activity(repeat(daily_life.stream, blocks[:20], 1), "chest", 1.7)
+    return daily_life.stream, blocks
 
 
 def test_an_hour_costs_some_ten_times_a_fixed_piece_of_work(
@@ -66,12 +66,12 @@ def test_an_hour_costs_some_ten_times_a_fixed_piece_of_work(
 
 
 def test_three_times_as_long_costs_three_times_as_much(day: tuple[LongStream, list[SampleBlock]]) -> None:
-    thrice, once, times = in_pairs(
+    thrice, single, times = in_pairs(
         lambda: monitor_activity(repeat(*day, 3), "chest", 1.7),
         lambda: monitor_activity(repeat(*day, 1), "chest", 1.7),
         3,
     )
-    sys.stdout.write(f"\nthree times as long: {thrice:.2f} s of CPU for {once:.2f}, {times:.2f} times\n")
+    sys.stdout.write(f"\nthree times as long: {thrice:.2f} s of CPU for {single:.2f}, {times:.2f} times\n")
     # a machine that slows down for one of a pair is not counted; what grew by squares would take nine times
     assert times <= 4.5
 
@@ -109,10 +109,10 @@ def analyse_alone(path: Path, out: Path) -> tuple[float, float]:
     manifest = out.with_suffix(".json")
     manifest.write_text(json.dumps({"protocol": "activity", "subject": {"height_m": 1.7}}))
     words = ["analyse", str(path), "--manifest", str(manifest), "--out", str(out)]
-    said = subprocess.check_output(
+    output = subprocess.check_output(
         [sys.executable, "-c", ALONE, *words], cwd=ROOT, text=True, stderr=subprocess.DEVNULL
     )
-    code, memory, cpu = said.splitlines()[-1].split()
+    code, memory, cpu = output.splitlines()[-1].split()
     assert code == "0"
     assert (out / "activity.json").is_file()
     return float(memory), float(cpu)

@@ -21,18 +21,18 @@ MOST = {"clean": 1.6, "late": 1.8}
 
 def ten_minutes() -> UniformRecording:
     """Five minutes with seven sensors, twice."""
-    made = simulated("five_minutes", 0)[0]
-    once = only(made, *(s for s in made.sensors if s != "chest"))
+    simulation = simulated("five_minutes", 0)[0]
+    single = only(simulation, *(s for s in simulation.sensors if s != "chest"))
 
     def twice(x: Floats) -> Floats:
         return np.concatenate((x, x))
 
     def both(x: SensorSignals) -> SensorSignals:
-        again = (np.concatenate((v, v)) for v in (x.valid, x.interpolated))
-        return SensorSignals(x.device_id, twice(x.acc), twice(x.gyr), None, *again)
+        second_concatenates = (np.concatenate((v, v)) for v in (x.valid, x.interpolated))
+        return SensorSignals(x.device_id, twice(x.acc), twice(x.gyr), None, *second_concatenates)
 
-    t_s = np.arange(2 * len(once.t_s)) / once.rate_hz
-    return replace(once, t_s=t_s, sensors={s: both(x) for s, x in once.sensors.items()})
+    t_s = np.arange(2 * len(single.t_s)) / single.rate_hz
+    return replace(single, t_s=t_s, sensors={s: both(x) for s, x in single.sensors.items()})
 
 
 def test_comparing_ten_minutes_of_seven_sensors_costs_a_few_orientations() -> None:
@@ -40,10 +40,10 @@ def test_comparing_ten_minutes_of_seven_sensors_costs_a_few_orientations() -> No
     takes = {"clean": take, "late": delay_sensor(take, "shank_r", 0.04)}
     for name, recording in takes.items():
         check_agreement(recording)
-        ours, others, ratio = in_pairs(
+        ours, remaining, ratio = in_pairs(
             lambda recording=recording: check_agreement(recording),  # type: ignore[misc]
             lambda: estimate_orientations(calibrate(take)),
             times=3,
         )
-        print(f"{name}: {ours:.2f} s, calibration and orientation {others:.2f} s, ratio {ratio:.2f}")
+        print(f"{name}: {ours:.2f} s, calibration and orientation {remaining:.2f} s, ratio {ratio:.2f}")
         assert ratio < MOST[name]

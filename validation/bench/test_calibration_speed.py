@@ -1,4 +1,4 @@
-"""What a calibration with all of its checks costs, against plain Python in the same run."""
+"""Cost of a calibration with all checks, against plain Python in the same run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.helpers.walks import cut, simulated
 
 
 def test_two_minutes_with_all_checks_in_one_and_a_half_seconds_of_a_quiet_core() -> None:
-    """Limit 1.5 s of a core that does the yardstick in 12 ms; what the sensors say of each other included."""
+    """Limit 1.5 s of a core that does the yardstick in 12 ms, including consistency checks."""
     recording = cut(simulated("five_minutes")[0], 0.0, 120.0)
     assert len(recording.sensors) == 7
 

@@ -21,20 +21,20 @@ The start, of about 3 s, weighs the more the faster analyses become."""
 
 
 def run_demo() -> float:
-    """Start the demo, stop it when all visits are analysed; seconds that took, as it says itself."""
+    """Start the demo, stop it when all visits are analysed; return its reported seconds."""
     process = subprocess.Popen(
         [sys.executable, "-m", "sagittal.server.main", "demo"], cwd=ROOT, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"}, start_new_session=True,
     )  # fmt: skip
     assert process.stdout is not None
-    said = []
+    message = []
     try:
         for line in process.stdout:
-            said.append(line)
-            found = re.search(r"(\d+) of (\d+) sessions analysed \((\d+) s\)", line)
-            if found and found[1] == found[2]:
-                return float(found[3])
-        raise AssertionError("the demo ended:\n" + "".join(said))
+            message.append(line)
+            match = re.search(r"(\d+) of (\d+) sessions analysed \((\d+) s\)", line)
+            if match and match[1] == match[2]:
+                return float(match[3])
+        raise AssertionError("the demo ended:\n" + "".join(message))
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(30)

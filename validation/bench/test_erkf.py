@@ -1,7 +1,7 @@
-"""Speed of the ErKF and its smoother against the paper's own form in whole matrices (issue 3).
+"""Speed of the ErKF and its smoother against the paper's form in whole matrices.
 
-Costs in µs depend on the machine: the floors below are of a free core of ours and stand in the
-output; what fails the test is three times that, or the ratio to the textbook in the same run.
+Costs in µs depend on the machine: the floors below are for an idle core and part of the output; the test
+fails at three times that, or by the ratio to the textbook form in the same run.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ TEN_MIN = 60_000
 
 
 def best(run: Callable[[], object], times: int = 5) -> float:
-    """Shortest time in s on one core: what the work costs when nothing else wants it."""
-    found = []
+    """Shortest time in s on one core, without competing load."""
+    result = []
     for _ in range(times):
         began = time.process_time()
         run()
-        found.append(time.process_time() - began)
-    return min(found)
+        result.append(time.process_time() - began)
+    return min(result)
 
 
 def ten_minutes() -> ErkfInputs:
@@ -119,16 +119,16 @@ def test_smoothing_costs_less_than_three_filters(params: ErkfParams, floor_us: f
     """A second pass of the filter, its record, and the way back."""
     inputs = mixed_walk().inputs
     smoothed(inputs.part(0, 300), params)
-    alone, whole = best(lambda: filtered(inputs, params)), best(lambda: smoothed(inputs, params), 3)
+    single, whole = best(lambda: filtered(inputs, params)), best(lambda: smoothed(inputs, params), 3)
     us = whole / len(inputs.step_s) * 1e6
     print(
         f"\n{params.states} states, smoothed: {us:.0f} µs/step (floor {floor_us:g}), "
-        f"{whole / alone:.1f} filters"
+        f"{whole / single:.1f} filters"
     )
     if params is FIFTEEN:
-        record_goal("ErKF, 15 states, seven sensors, a step", 22.0, alone / len(inputs.step_s) * 1e6, "µs")
+        record_goal("ErKF, 15 states, seven sensors, a step", 22.0, single / len(inputs.step_s) * 1e6, "µs")
         record_goal("ErKF with smoother, 15 states, seven sensors, a step", 50.0, us, "µs")
-    assert whole <= 3.0 * alone
+    assert whole <= 3.0 * single
     assert us <= BUSY * floor_us
 
 

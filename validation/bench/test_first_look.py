@@ -1,4 +1,4 @@
-"""What a first look costs: a session page beside many controls, and a large table before it is described."""
+"""Cost of first views: a session page with many controls, and a large undescribed table."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ async def test_a_large_table_is_looked_at_without_reading_all_of_it(tmp_path: Pa
     large = head + b"\n" + (rows + b"\n") * round(1e6 * TABLE_MB / (len(rows) + 1))
     async with open_clinic(tmp_path / "clinic") as clinic:
         session = await new_session(clinic, "TABLE-1")
-        at = f"{API}/sessions/{session}"
+        position = f"{API}/sessions/{session}"
         async with clinic.client("clinician", timeout=120) as client:
-            (await client.put(f"{at}/files/large_lf.csv", content=large)).raise_for_status()
+            (await client.put(f"{position}/files/large_lf.csv", content=large)).raise_for_status()
             began = time.process_time()
-            (shape,) = (await client.get(f"{at}/tables")).raise_for_status().json()
+            (shape,) = (await client.get(f"{position}/tables")).raise_for_status().json()
             body: dict[str, Any] = {"file": "large_lf.csv", "source": shape["source"] | {"rate_hz": 100}}
-            (check,) = (await client.post(f"{at}/tables/checks", json=body)).raise_for_status().json()
+            (check,) = (await client.post(f"{position}/tables/checks", json=body)).raise_for_status().json()
             took = time.process_time() - began
     sys.stdout.write(f"a table of {len(large) / 1e6:.0f} MB: guessed and checked in {took:.3f} s of CPU\n")
     record_goal(f"preview of a table of {TABLE_MB:g} MB, CPU", PREVIEW_S, took, "s")

@@ -43,13 +43,13 @@ def made(n: int) -> tuple[Floats, Floats, Floats, RestMeans]:
 )
 def test_a_sample_takes_at_most_so_many_of_vqf(names: tuple[str, ...], limit: float) -> None:
     vqf = pytest.importorskip("vqf", reason="vqf is a test extra without a wheel for this Python")
-    gyr, acc, mag, rest = made(N)
+    gyr, acc, mag, remainder = made(N)
     for name in names:
-        FusionFilter(name, RATE, rest).advance(gyr[:2], acc[:2], mag[:2])
+        FusionFilter(name, RATE, remainder).advance(gyr[:2], acc[:2], mag[:2])
         ours, theirs = [], []
         # interleaved, so that a busy moment of the machine meets both
         for _ in range(5):
-            running = FusionFilter(name, RATE, rest)
+            running = FusionFilter(name, RATE, remainder)
             ours.append(best(lambda r=running: r.advance(gyr, acc, mag), 2))  # type: ignore[misc]
             theirs.append(best(lambda: vqf.VQF(1 / RATE).updateBatch(gyr[:, 0], acc[:, 0], mag[:, 0]), 2))
         ratio = min(ours) / min(theirs)
@@ -60,11 +60,11 @@ def test_a_sample_takes_at_most_so_many_of_vqf(names: tuple[str, ...], limit: fl
 def test_madgwick_takes_a_three_hundredth_of_ahrs() -> None:
     """The same recursion: ahrs turns one array a sample in Python."""
     ahrs = pytest.importorskip("ahrs")
-    gyr, acc, mag, rest = made(2_000)
-    FusionFilter("madgwick_2011", RATE, rest).advance(gyr[:2], acc[:2], mag[:2])
+    gyr, acc, mag, remainder = made(2_000)
+    FusionFilter("madgwick_2011", RATE, remainder).advance(gyr[:2], acc[:2], mag[:2])
     ours, theirs = [], []
     for _ in range(3):
-        running = FusionFilter("madgwick_2011", RATE, rest)
+        running = FusionFilter("madgwick_2011", RATE, remainder)
         ours.append(best(lambda r=running: r.advance(gyr, acc, mag), 5))  # type: ignore[misc]
         theirs.append(best(lambda: ahrs.filters.Madgwick(gyr[:, 0], acc[:, 0], mag[:, 0], frequency=RATE), 1))
     ratio = min(theirs) / min(ours)

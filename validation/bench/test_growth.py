@@ -141,7 +141,7 @@ on a machine that others use 1.7 among 40, and .4 × 10."""
 
 
 def run(script: str, *words: str) -> str:
-    """What a script prints that runs in a process of its own."""
+    """Output of a script run in a separate process."""
     done = subprocess.run(
         [sys.executable, "-c", script, *words],
         cwd=ROOT, capture_output=True, text=True, check=True,
@@ -152,7 +152,7 @@ def run(script: str, *words: str) -> str:
 
 def test_time_and_memory_grow_with_the_length_and_no_faster(tmp_path: Path) -> None:
     run(MAKE, str(tmp_path), *map(str, LAPS))
-    found = {
+    by_laps = {
         laps: json.loads(run(ANALYSE, str(tmp_path / "1.parquet"), str(tmp_path / f"{laps}.parquet")))
         for laps in LAPS
     }
@@ -165,9 +165,9 @@ def test_time_and_memory_grow_with_the_length_and_no_faster(tmp_path: Path) -> N
             f"{x['stages']['poses']:.1f} s",
             f"{x['peak_mb']:.0f} MB",
         ]
-        for (laps, length), x in zip(LAPS.items(), found.values(), strict=True)
+        for (laps, length), x in zip(LAPS.items(), by_laps.values(), strict=True)
     ]
-    slope = (found[14]["peak_mb"] - found[1]["peak_mb"]) / (LAPS[14] - LAPS[1]) * 60.0
+    slope = (by_laps[14]["peak_mb"] - by_laps[1]["peak_mb"]) / (LAPS[14] - LAPS[1]) * 60.0
     record_speed(
         "Length of a take",
         ("walk of seven sensors, 100 Hz", "CPU", "real time", "CPU a second", "of it poses", "peak memory"),
@@ -175,63 +175,65 @@ def test_time_and_memory_grow_with_the_length_and_no_faster(tmp_path: Path) -> N
         f"From reading the file to writing the results, filters compiled. Memory grows by {slope:.0f} MB a "
         "minute; the process itself with all libraries is most of what one minute takes.",
     )
-    ten = found[14]
+    ten = by_laps[14]
     record_goal("analysis of 10 min of seven sensors, CPU", 4.0, ten["cpu_s"], "s")
     record_goal("the same, peak memory", 350.0, ten["peak_mb"], "MB")
-    if 84 in found:
-        record_goal("analysis of 60 min of seven sensors, peak memory", 600.0, found[84]["peak_mb"], "MB")
-    assert all(x["parameters"] > 50 for x in found.values())
-    assert found[14]["cpu_s"] / LAPS[14] <= SLOWER * found[1]["cpu_s"] / LAPS[1]
-    assert {laps: x["peak_mb"] for laps, x in found.items() if x["peak_mb"] > MOST_MB.get(laps, np.inf)} == {}
+    if 84 in by_laps:
+        record_goal("analysis of 60 min of seven sensors, peak memory", 600.0, by_laps[84]["peak_mb"], "MB")
+    assert all(x["parameters"] > 50 for x in by_laps.values())
+    assert by_laps[14]["cpu_s"] / LAPS[14] <= SLOWER * by_laps[1]["cpu_s"] / LAPS[1]
+    assert {
+        laps: x["peak_mb"] for laps, x in by_laps.items() if x["peak_mb"] > MOST_MB.get(laps, np.inf)
+    } == {}
 
 
 def test_memory_of_two_feet_grows_by_less_than_their_results_and_signals(tmp_path: Path) -> None:
     run(MAKE, str(tmp_path), "1", "14")
     run(FEET, str(tmp_path / "1.parquet"), str(tmp_path / "warm.parquet"), "1")
-    found = {}
+    result = {}
     for times in WALKED:
         path = tmp_path / f"feet_{times}.parquet"
         run(FEET, str(tmp_path / "14.parquet"), str(path), str(times))
-        found[times] = json.loads(run(ANALYSE, str(tmp_path / "warm.parquet"), str(path)))
+        result[times] = json.loads(run(ANALYSE, str(tmp_path / "warm.parquet"), str(path)))
     record_speed(
         "Two feet",
         ("walk of two feet, 100 Hz", "CPU", "peak memory"),
         [
             [f"{times * LAPS[14] / 60:.0f} min", f"{x['cpu_s']:.1f} s", f"{x['peak_mb']:.0f} MB"]
-            for times, x in found.items()
+            for times, x in result.items()
         ],
         "As above; of a take above eleven minutes figure, angles and paths lie in a file meanwhile.",
     )
-    if 35 in found:
-        record_goal("analysis of 6 h of two feet, peak memory", 1000.0, found[35]["peak_mb"], "MB")
-    grown = (found[6]["peak_mb"] - found[2]["peak_mb"]) * 2**20 / (4.0 * 100.0 * LAPS[14])
+    if 35 in result:
+        record_goal("analysis of 6 h of two feet, peak memory", 1000.0, result[35]["peak_mb"], "MB")
+    grown = (result[6]["peak_mb"] - result[2]["peak_mb"]) * 2**20 / (4.0 * 100.0 * LAPS[14])
     assert grown <= BYTES_A_SAMPLE
-    assert all(x["parameters"] > 30 for x in found.values())
+    assert all(x["parameters"] > 30 for x in result.values())
 
 
 def test_a_live_session_costs_no_more_among_others() -> None:
     """In one process, as an estimator runs them: pushes of ten samples, sessions in turn."""
     compile_live_kernels()
     take = simulated("five_minutes", 0)[0]
-    given = list(islice(batches(take, 10), 1200))
+    items = list(islice(batches(take, 10), 1200))
     rows, ms = [], {}
     for count in AT_ONCE:
         gc.collect()
-        before = resident_mb()
+        initial = resident_mb()
         sessions = [OnlineSession(hello_of(take), take.subject) for _ in range(count)]
-        at = 0
+        index = 0
         while any(s.chain is None for s in sessions):
             for s in sessions:
-                s.push(given[at])
-            at += 1
+                s.push(items[index])
+            index += 1
         took = []
-        for batch in given[at : at + PUSHES]:
+        for batch in items[index : index + PUSHES]:
             for s in sessions:
                 began = time.process_time()
                 s.push(batch)
                 took.append(1e3 * (time.process_time() - began))
         ms[count], mean = float(np.median(took)), float(np.mean(took))
-        grown = max(0.0, resident_mb() - before)
+        grown = max(0.0, resident_mb() - initial)
         rows.append(
             [f"{count}", f"{ms[count]:.2f} ms", f"{mean:.2f} ms", f"{mean * count:.0f} %",
              f"{grown / count:.1f} MB"]
@@ -250,11 +252,11 @@ def test_a_live_session_costs_no_more_among_others() -> None:
 
 @pytest.mark.anyio
 async def test_the_list_of_patients_grows_slower_than_their_number(tmp_path: Path) -> None:
-    rows, ms, asked = [], {}, {}
+    rows, ms, requests = [], {}, {}
     for people in PEOPLE:
         async with open_clinic(tmp_path / str(people)) as clinic:
             gc.collect()
-            before = resident_mb()
+            initial = resident_mb()
             crowd.fill(clinic, people, VISITS)
             async with clinic.client("admin") as client:
                 (await client.get("/patients")).raise_for_status()
@@ -265,9 +267,9 @@ async def test_the_list_of_patients_grows_slower_than_their_number(tmp_path: Pat
                     took.append(1e3 * (time.process_time() - began))
                 with crowd.statements() as sent:
                     await client.get("/patients")
-            ms[people], asked[people] = min(took), len(sent)
-            grown = max(0.0, resident_mb() - before)
-            rows.append([f"{people}", f"{ms[people]:.0f} ms", f"{asked[people]}", f"{grown:.0f} MB"])
+            ms[people], requests[people] = min(took), len(sent)
+            grown = max(0.0, resident_mb() - initial)
+            rows.append([f"{people}", f"{ms[people]:.0f} ms", f"{requests[people]}", f"{grown:.0f} MB"])
     record_speed(
         "Patients",
         (f"patients of {VISITS} visits", "their list", "statements", "memory"),
@@ -275,7 +277,7 @@ async def test_the_list_of_patients_grows_slower_than_their_number(tmp_path: Pat
         "CPU time of a page in the web process, the network not counted; memory with what wrote the rows.",
     )
     record_goal("list of 500 patients, CPU", 40.0, ms[500], "ms")
-    assert asked[500] == asked[1]
+    assert requests[500] == requests[1]
     assert ms[500] <= 10.0 * DEARER * ms[1]
 
 
@@ -305,15 +307,15 @@ def test_commands_are_measured(tmp_path: Path) -> None:
 
 def command_s(words: list[str], scratch: Path) -> float:
     """CPU seconds of a command with all it starts; modules are read as an installation has them, compiled."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    initial = resource.getrusage(resource.RUSAGE_CHILDREN)
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     subprocess.run(
         [sys.executable, "-m", "sagittal.server.main", *words],
         cwd=ROOT, capture_output=True, check=True,
         env={**environment, "PYTHONPYCACHEPREFIX": str(scratch / "modules"), "OPENBLAS_NUM_THREADS": "1"},
     )  # fmt: skip
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    final = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return final.ru_utime + final.ru_stime - initial.ru_utime - initial.ru_stime
 
 
 def resident_mb() -> float:

@@ -1,4 +1,4 @@
-"""What a guided functional test costs the estimator process beside the rest of a push."""
+"""Additional cost of a guided functional test per push in the estimator process."""
 
 from __future__ import annotations
 

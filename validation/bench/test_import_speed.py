@@ -1,4 +1,4 @@
-"""What reading costs beside the least that any reader has to do with the same bytes, format by format."""
+"""Cost of reading relative to the minimum for the same bytes, by format."""
 
 from __future__ import annotations
 
@@ -68,10 +68,10 @@ def test_ten_minutes_of_seven_sensors_cost_at_most_twice_what_parsing_them_does(
 )
 def test_other_text_formats_cost_at_most_three_times_what_parsing_them_does(label: str) -> None:
     name, make = VENDOR_SAMPLES[label]
-    once = make()
-    start = len(once) - len(b"".join(once.splitlines(keepends=True)[-N:]))
-    head, rows = once[:start], once[start:] * 60
-    vendor = find_vendor(once)
+    walk = make()
+    start = len(walk) - len(b"".join(walk.splitlines(keepends=True)[-N:]))
+    head, rows = walk[:start], walk[start:] * 60
+    vendor = find_vendor(walk)
     assert vendor is not None
     separator = "\t" if b"\t" in rows[:200] else ","
     options = csv.ReadOptions(use_threads=False, autogenerate_column_names=True)
@@ -107,7 +107,7 @@ def test_a_stored_take_costs_at_most_three_times_what_its_columns_do(files: list
     values = 0
 
     def read_columns() -> None:
-        """Columns alone: no checksum of pages, no hash of the file, nothing laid side by side or checked."""
+        """Columns alone, without checksums, hashing, layout or checks."""
         nonlocal values
         table = pq.ParquetFile(pa.BufferReader(data)).read(use_threads=False)
         values = sum(column.to_numpy().nbytes for column in table.columns)

@@ -51,13 +51,13 @@ def walk(worn: Worn) -> tuple[L7sInputs, LegModel]:
 
 
 def best(run: Callable[[], object], times: int = 5) -> float:
-    """Shortest time in s on one core: what the work costs when nothing else wants it."""
-    found = []
+    """Shortest time in s on one core, without competing load."""
+    result = []
     for _ in range(times):
         began = time.process_time()
         run()
-        found.append(time.process_time() - began)
-    return min(found)
+        result.append(time.process_time() - began)
+    return min(result)
 
 
 @pytest.mark.parametrize("adjoint", ["printed", "exact"])
@@ -113,10 +113,10 @@ def test_the_cost_grows_with_the_duration_and_no_faster() -> None:
         np.tile(inputs.R, (8, 1, 1, 1)), np.tile(inputs.acc, (8, 1, 1)), np.tile(inputs.step, (8, 1)), "3I"
     )
     state = start_l7s_state(inputs, model)
-    _, once, ratio = in_pairs(
+    _, single, ratio = in_pairs(
         lambda: filter_block(state, long, model, RATE), lambda: filter_block(state, inputs, model, RATE)
     )
-    print(f"\n{n} samples {1e3 * once:.0f} ms, eight times as many {ratio:.2f} times as long")
+    print(f"\n{n} samples {1e3 * single:.0f} ms, eight times as many {ratio:.2f} times as long")
     assert ratio < 8.0 * 1.25
 
 

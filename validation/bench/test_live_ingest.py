@@ -52,14 +52,14 @@ def cpu_s(pid: int) -> float:
 
 def paired(clinic: Clinic, number: int) -> list[tuple[str, str]]:
     """Take and token of so many tablets."""
-    found = []
+    result = []
     with clinic.db.write() as c:
         for _ in range(number):
             session = sessions.create(c, None, clinic.patient.id)
             _, code = live.open_take(c, None, session.id)
             one = live.pair(c, code)
-            found.append((one.take, one.token))
-    return found
+            result.append((one.take, one.token))
+    return result
 
 
 async def at_its_pace(began: float, lag: float) -> AsyncIterator[bytes]:
@@ -70,11 +70,11 @@ async def at_its_pace(began: float, lag: float) -> AsyncIterator[bytes]:
 
 
 async def metered(pid: int, began: float) -> float:
-    """CPU seconds of the server while all stream and nobody begins or ends."""
+    """CPU seconds of the server during steady streaming."""
     await asyncio.sleep(began + 0.5 - time.monotonic())
-    before = cpu_s(pid)
+    initial = cpu_s(pid)
     await asyncio.sleep(began + SECONDS - 0.5 - time.monotonic())
-    return cpu_s(pid) - before
+    return cpu_s(pid) - initial
 
 
 async def all_tablets(
@@ -110,20 +110,20 @@ def test_two_hundred_tablets_are_recorded_without_a_loss(tmp_path: Path) -> None
         share = asyncio.run(all_tablets(socket, takes, reports, server.pid))
         whole = cpu_s(server.pid) - began
         with clinic.db.read() as c:
-            kept = c.execute(
+            stored_mask = c.execute(
                 select(live_take.c.state, live_take.c.count, live_take.c.sha256, func.count())
                 .where(live_take.c.id.in_([take for take, _ in takes]))
                 .group_by(live_take.c.state, live_take.c.count, live_take.c.sha256)
             ).all()
     acks = sorted(x for report in reports for x in report.ack_s)
     p50, p99 = (acks[int(part * len(acks))] for part in (0.5, 0.99))
-    rest = whole - share * SECONDS
+    remainder = whole - share * SECONDS
     sys.stdout.write(
         f"{TABLETS} tablets, {len(acks)} batches: acknowledged p50 {1000 * p50:.0f} ms, p99 "
         f"{1000 * p99:.0f} ms; CPU per tablet {100 * share / TABLETS:.3f} % of a core, "
-        f"{1000 * rest / TABLETS:.0f} ms to begin and end\n"
+        f"{1000 * remainder / TABLETS:.0f} ms to begin and end\n"
     )
-    assert kept == [("finished", len(FRAMES), reports[0].sha256, TABLETS)]
+    assert stored_mask == [("finished", len(FRAMES), reports[0].sha256, TABLETS)]
     assert len(acks) == TABLETS * len(FRAMES)
     assert sum(report.resent for report in reports) == 0
     assert p99 <= 5.0  # only gross losses: on a busy disk 1.7 s were seen, on an idle one 0.5 s

@@ -1,8 +1,7 @@
-"""Twenty live sessions with feedback on one server: seven IMUs at 100 Hz each, one browser each.
+"""Twenty live sessions with feedback on one server: seven IMUs at 100 Hz and one browser each.
 
-All take the same simulated walk. Standing and calibration go in as fast as they are taken; then the walk
-comes at real speed, the sessions at different moments of their batches. Longer: SAGITTAL_LIVE_SECONDS=600;
-more: SAGITTAL_LIVE_SESSIONS=40.
+All stream the same simulated walk. Standing and calibration are sent at full speed, the walk in real time,
+with staggered batches. Longer: SAGITTAL_LIVE_SECONDS=600; more: SAGITTAL_LIVE_SESSIONS=40.
 """
 
 from __future__ import annotations
@@ -99,18 +98,18 @@ def take() -> tuple[Hello, np.ndarray[Any, np.dtype[np.float32]]]:
 
 
 def frames(seconds: float) -> list[bytes]:
-    """Batches of so many seconds; behind the walk it begins again."""
+    """Batches of so many seconds; the walk repeats endlessly."""
     _, samples = take()
     first, last = int(RUNNING_S * RATE_HZ), int(WALKED_S * RATE_HZ)
     index = np.arange(int(seconds * RATE_HZ))
     index = np.where(index < last, index, first + (index - last) % (last - first))
-    made = []
+    result = []
     for seq, start in enumerate(range(0, len(index) - PER_BATCH + 1, PER_BATCH)):
         t0 = round(start / RATE_HZ * 1e6)
-        made.append(
+        result.append(
             encode_batch(SampleBatch(0, seq, t0, t0 + 50_000, samples[index[start : start + PER_BATCH]]))
         )
-    return made
+    return result
 
 
 @dataclass
@@ -146,15 +145,15 @@ def usage(pid: int) -> Usage:
 
 def estimators(pid: int) -> list[int]:
     """Children of the server that estimate."""
-    found = []
+    result = []
     for path in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
             if parent == pid and b"sagittal.server.live.estimator" in (path / "cmdline").read_bytes():
-                found.append(int(path.name))
+                result.append(int(path.name))
         except (OSError, IndexError):
             continue
-    return found
+    return result
 
 
 def opened(client: httpx.Client, number: int) -> Session:
@@ -216,7 +215,7 @@ async def browser(base: str, s: Session, cookie: str) -> None:
     """Note when strides and cues come; frames are only counted."""
     loop = asyncio.get_running_loop()
     from_s = RUNNING_S + SETTLING_S
-    known: dict[int, float] = {}
+    reference: dict[int, float] = {}
     async with websockets.connect(
         f"{base}/sessions/{s.session}/live/feed",
         additional_headers={"Cookie": cookie}, compression=None, proxy=None, max_size=None,
@@ -229,13 +228,13 @@ async def browser(base: str, s: Session, cookie: str) -> None:
                     s.shown_s = json.loads(text)["t"]
             elif text.startswith('{"type":"stride"'):  # type: ignore[arg-type]
                 message = json.loads(text)
-                known[message["n"]] = message["detected_s"]
+                reference[message["n"]] = message["detected_s"]
                 if s.began and message["detected_s"] >= from_s:
                     s.told_s.append(now - (s.began + message["detected_s"]))
             elif text.startswith('{"type":"cue"'):  # type: ignore[arg-type]
-                at = known.get(json.loads(text)["n"])
-                if s.began and at is not None and at >= from_s:
-                    s.cue_s.append(now - (s.began + at))
+                response = reference.get(json.loads(text)["n"])
+                if s.began and response is not None and response >= from_s:
+                    s.cue_s.append(now - (s.began + response))
 
 
 async def drive(base: str, cookie: str, all_of: Sequence[Session], pids: Sequence[int]) -> list[list[Usage]]:
@@ -262,15 +261,15 @@ async def drive(base: str, cookie: str, all_of: Sequence[Session], pids: Sequenc
         gate.set()
         await asyncio.sleep(STRIDE_S / len(gates))
     await asyncio.sleep(SETTLING_S)
-    seen = [[usage(pid) for pid in pids]]
+    observations = [[usage(pid) for pid in pids]]
     for _ in range(10):
         await asyncio.sleep((SECONDS - 1.0) / 10)
-        seen.append([usage(pid) for pid in pids])
+        observations.append([usage(pid) for pid in pids])
     await asyncio.gather(*tablets)
     for task in browsers:
         task.cancel()
     await asyncio.gather(*browsers, return_exceptions=True)
-    return seen
+    return observations
 
 
 def quantiles(values: Sequence[float]) -> str:
@@ -297,21 +296,21 @@ def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path
             time.sleep(0.1)
         pids = [service.process.pid, *estimators(service.process.pid)]
         assert len(pids) == 2
-        seen = asyncio.run(drive(base, cookie, all_of, pids))
+        result = asyncio.run(drive(base, cookie, all_of, pids))
         counts = [
             client.get(f"/api/v1/sessions/{s.session}/live").raise_for_status().json()["count"]
             for s in all_of
         ]
     batches = int((RUNNING_S + SETTLING_S + SECONDS) * RATE_HZ) // PER_BATCH
     acks = [x for s in all_of for x in s.ack_s]
-    told = [x for s in all_of for x in s.told_s]
+    notices = [x for s in all_of for x in s.told_s]
     cues = [x for s in all_of for x in s.cue_s]
     span = (SECONDS - 1.0) * len(all_of)
-    web, estimator = (100 * (seen[-1][i].cpu_s - seen[0][i].cpu_s) / span for i in (0, 1))
-    memory = [[round(u.memory / 1e6) for u in moment] for moment in seen]
+    web, estimator = (100 * (result[-1][i].cpu_s - result[0][i].cpu_s) / span for i in (0, 1))
+    memory = [[round(u.memory / 1e6) for u in moment] for moment in result]
     sys.stdout.write(
         f"{len(all_of)} sessions, {PER_BATCH} samples a batch, {SECONDS:g} s: ack {quantiles(acks)}; "
-        f"stride {quantiles(told)}; cue {quantiles(cues)} ({len(cues)}); "
+        f"stride {quantiles(notices)}; cue {quantiles(cues)} ({len(cues)}); "
         f"{sum(s.pictures for s in all_of)} pictures; per session {web:.2f} % web, {estimator:.2f} % "
         f"estimator of a core; MB {memory}\n"
     )
@@ -319,10 +318,10 @@ def test_twenty_sessions_are_acknowledged_estimated_and_coached_in_time(tmp_path
         record_goal("cue of 40 live sessions on two processors, 95 of 100 within", 60.0,
                     1e3 * float(np.quantile(cues, 0.95)), "ms")  # fmt: skip
     assert counts == [batches] * len(all_of)
-    assert seen[-1][0].memory < 1.1 * seen[0][0].memory
-    assert seen[-1][1].memory < 1.1 * seen[0][1].memory + FIRST_MINUTE_MB * 1e6 * len(all_of)
+    assert result[-1][0].memory < 1.1 * result[0][0].memory
+    assert result[-1][1].memory < 1.1 * result[0][1].memory + FIRST_MINUTE_MB * 1e6 * len(all_of)
     assert all(s.recording for s in all_of)
     assert np.quantile(acks, 0.99) <= BUSY * 0.4
-    assert np.quantile(told, 0.95) <= BUSY * 0.06
+    assert np.quantile(notices, 0.95) <= BUSY * 0.06
     assert np.quantile(cues, 0.95) <= BUSY * 0.06
     assert len(cues) >= len(all_of) * SECONDS / 2

@@ -59,8 +59,8 @@ BEHIND_S: Final = 600.0
 
 @pytest.fixture
 def recordings(request: pytest.FixtureRequest) -> int:
-    wanted: int = request.config.getoption("--recordings")
-    return wanted
+    expected: int = request.config.getoption("--recordings")
+    return expected
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def queued(recordings: int) -> int:
 
 @pytest.fixture
 def service(source: Source, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
-    """A server without workers of its own, on either engine."""
+    """Server without workers, on either engine."""
     settings = settings_of(tmp_path, source)
     for name, value in settings.environment().items():
         if name != "SAGITTAL_PORT":
@@ -129,7 +129,7 @@ def test_each_recording_is_analysed_once_and_pages_come_meanwhile(
 
 
 def test_more_workers_do_more_at_a_time(source: Source, tmp_path: Path, recordings: int) -> None:
-    """Simulated ones: they compute nothing for a while and write what a worker writes."""
+    """Throughput of simulated workers, which sleep and write like real ones."""
     db = Database(source)
     rates = {}
     with contextlib.closing(db):
@@ -167,7 +167,7 @@ def work_off(source: Source) -> int:
 
 
 def queue_recordings(client: httpx.Client, count: int) -> tuple[list[str], float]:
-    """Upload recordings, each to a visit of its own, and ask for their analyses; the visits, and seconds."""
+    """Upload recordings, each to a separate visit, and request their analyses; return visits and seconds."""
     one = RecordingSetup(worn=("pelvis",))
     contents = [
         write_recording(
@@ -176,14 +176,14 @@ def queue_recordings(client: httpx.Client, count: int) -> tuple[list[str], float
         for seed in range(3)
     ]
     began = time.monotonic()
-    made = []
+    result = []
     for number in range(count):
         session = new_session(client, f"L-{number}")
         content = contents[number % len(contents)]
         client.put(f"/api/v1/sessions/{session}/files/walk.parquet", content=content).raise_for_status()
         client.post(f"/api/v1/sessions/{session}/analyses", json={}).raise_for_status()
-        made.append(session)
-    return made, time.monotonic() - began
+        result.append(session)
+    return result, time.monotonic() - began
 
 
 def kill_until_all_ended(db: Database, workers: Workers, kills: int) -> int:
@@ -192,15 +192,15 @@ def kill_until_all_ended(db: Database, workers: Workers, kills: int) -> int:
     ended = select(func.count()).where(job.c.finished_at.is_not(None))
     waiting = select(func.count()).where(job.c.finished_at.is_(None))
     running = select(job.c.worker).where(job.c.state == "running", job.c.deaths == 0)
-    killed, seen, moved = 0, 0, time.monotonic()
+    killed, observations, moved = 0, 0, time.monotonic()
     while True:
         with db.read() as c:
             done, left = c.execute(ended).scalar_one(), c.execute(waiting).scalar_one()
             busy = {int(name.split(":")[1]) for name in c.execute(running).scalars()}
         if not left:
             return killed
-        if done > seen:
-            seen, moved = done, time.monotonic()
+        if done > observations:
+            observations, moved = done, time.monotonic()
         assert time.monotonic() < moved + BEHIND_S
         living = sorted(busy.intersection(workers.pids))
         if living and killed < kills and done >= (killed + 1) * (done + left) / (kills + 1):

@@ -21,13 +21,13 @@ LIMIT = 0.5
 
 
 def best(run: Callable[[], object], times: int = 7) -> float:
-    """Shortest wall time in s: what the work costs when nothing else wants the core."""
-    found = []
+    """Shortest wall time in s, without competing load."""
+    result = []
     for _ in range(times):
         start = time.perf_counter()
         run()
-        found.append(time.perf_counter() - start)
-    return min(found)
+        result.append(time.perf_counter() - start)
+    return min(result)
 
 
 def test_mahony_takes_at_most_half_the_time_of_vqf_per_sample() -> None:

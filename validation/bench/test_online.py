@@ -1,7 +1,7 @@
-"""What a live session costs the estimator process (issue 5).
+"""Cost of a live session in the estimator process.
 
-Costs in µs depend on the machine: the floors below are issue 5's for a free core of ours and stand in the
-output; what fails the test is a multiple of that, or the ratio to the bare filter in the same run.
+Costs in µs depend on the machine: the floors below are for an idle core and part of the output; the test
+fails at a multiple of that, or by the ratio to the bare filter in the same run.
 """
 
 from __future__ import annotations
@@ -64,50 +64,50 @@ def walk(*segments: Segment) -> UniformRecording:
 
 @cache
 def begun(size: int, segments: tuple[Segment, ...] = ()) -> tuple[OnlineSession, list[SampleBatch], float]:
-    """A session that has just been calibrated, its further batches, and what the calibrating push took, s."""
+    """Freshly calibrated session, its further batches, and the duration of the calibrating push, s."""
     compile_live_kernels()
     take = walk(*segments)
-    online, rest = OnlineSession(hello_of(take), take.subject), iter(batches(take, size))
+    online, remainder = OnlineSession(hello_of(take), take.subject), iter(batches(take, size))
     took = 0.0
     while online.chain is None:
-        batch = next(rest)
+        batch = next(remainder)
         began = time.process_time()
         online.push(batch)
         took = time.process_time() - began
-    return online, list(rest), took
+    return online, list(remainder), took
 
 
-def quickest(online: OnlineSession, rest: Sequence[SampleBatch], parts: int = 6) -> float:
-    """Time per push of the quickest of some equal parts, s: what it costs when nothing else wants a core."""
-    edges = np.linspace(0, len(rest), parts + 1).astype(int).tolist()
-    found: list[float] = []
+def quickest(online: OnlineSession, remainder: Sequence[SampleBatch], parts: int = 6) -> float:
+    """Time per push of the fastest of several equal parts, s."""
+    edges = np.linspace(0, len(remainder), parts + 1).astype(int).tolist()
+    values: list[float] = []
     for a, b in pairwise(edges):
         began = time.process_time()
-        for batch in rest[a:b]:
+        for batch in remainder[a:b]:
             online.push(batch)
-        found.append((time.process_time() - began) / (b - a))
-    return min(found)
+        values.append((time.process_time() - began) / (b - a))
+    return min(values)
 
 
 @pytest.mark.parametrize("size", PUSH_MS)
 def test_a_push_costs_little_more_than_its_filter(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
     begun.cache_clear()
-    online, rest, took = begun(size)
-    alone: list[float] = []
+    online, session, took = begun(size)
+    single_values: list[float] = []
     push = LiveErkf.push
 
     def timed(self: LiveErkf, signals: object) -> object:
         began = time.perf_counter()
-        found = push(self, signals)  # type: ignore[arg-type]
-        alone.append(time.perf_counter() - began)
-        return found
+        frame = push(self, signals)  # type: ignore[arg-type]
+        single_values.append(time.perf_counter() - began)
+        return frame
 
-    half = len(rest) // 2
-    whole = quickest(online, rest[:half])
+    half = len(session) // 2
+    whole = quickest(online, session[:half])
     monkeypatch.setattr(LiveErkf, "push", timed)
-    for batch in rest[half:]:
+    for batch in session[half:]:
         online.push(batch)
-    bare = min(float(np.mean(part)) for part in np.array_split(alone, 6))  # as the whole is taken
+    bare = min(float(np.mean(part)) for part in np.array_split(single_values, 6))  # as the whole is taken
     share = 100.0 * whole * 100.0 / size
     print(
         f"\nPush of {size}: {1e3 * whole:.2f} ms (floor {PUSH_MS[size]:g}), {share:.2f} % of a core (floor "
@@ -120,38 +120,38 @@ def test_a_push_costs_little_more_than_its_filter(size: int, monkeypatch: pytest
 
 @pytest.mark.parametrize("name", ["feet_pelvis3", "feet2"])
 def test_fewer_sensors_cost_no_more_than_seven(name: str) -> None:
-    online, rest, _ = begun(10, PRESETS[name])  # type: ignore[index]
-    ms = 1e3 * quickest(online, rest[:1200])
+    online, session, _ = begun(10, PRESETS[name])  # type: ignore[index]
+    ms = 1e3 * quickest(online, session[:1200])
     print(f"\nPush of 10, {name}: {ms:.2f} ms (floor {PUSH_MS[10]:g})")
     assert ms <= BUSY * PUSH_MS[10]
 
 
 def test_a_stride_is_measured_in_two_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
     begun.cache_clear()
-    online, rest, _ = begun(10)
-    spent, told = [], []
+    online, session, _ = begun(10)
+    spent, notices = [], []
     push = LiveStrides.push
 
     def timed(self: LiveStrides, *arguments: object) -> list[LiveStride]:
         began = time.perf_counter()
-        found = push(self, *arguments)  # type: ignore[arg-type]
-        if found:
-            spent.append((time.perf_counter() - began) / len(found))
-            told.extend(found)
-        return found
+        frame = push(self, *arguments)  # type: ignore[arg-type]
+        if frame:
+            spent.append((time.perf_counter() - began) / len(frame))
+            notices.extend(frame)
+        return frame
 
     monkeypatch.setattr(LiveStrides, "push", timed)
-    for batch in rest[:1500]:
+    for batch in session[:1500]:
         online.push(batch)
     ms = 1e3 * float(np.median(spent))
-    print(f"\nA stride, told once or again: {ms:.2f} ms (floor {STRIDE_MS:g}), {len(told)} of them")
-    assert len(told) > 100
+    print(f"\nA stride, told once or again: {ms:.2f} ms (floor {STRIDE_MS:g}), {len(notices)} of them")
+    assert len(notices) > 100
     assert ms <= BUSY * STRIDE_MS
 
 
-def endless(rest: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
-    """The same walking again and again, on a clock that goes on."""
-    part = rest[100:1300]
+def endless(remainder: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
+    """The same walking repeated, on a continuing clock."""
+    part = remainder[100:1300]
     span_us = part[-1].t0_us + 100_000 - part[0].t0_us
     for k in range(count):
         lap, batch = k // len(part), part[k % len(part)]
@@ -163,14 +163,14 @@ def endless(rest: Sequence[SampleBatch], count: int) -> Iterator[SampleBatch]:
 
 def test_memory_is_flat_over_three_minutes() -> None:
     begun.cache_clear()
-    online, rest, _ = begun(10)
-    for batch in rest[:100]:
+    online, session, _ = begun(10)
+    for batch in session[:100]:
         online.push(batch)
         online.compare_sensors()
     held = []
     tracemalloc.start()
     try:
-        for k, batch in enumerate(endless(rest, 1800)):
+        for k, batch in enumerate(endless(session, 1800)):
             online.push(batch)
             if k % 10 == 9:  # once a second, as on the server
                 online.compare_sensors()
@@ -190,10 +190,10 @@ def test_comparing_the_sensors_costs_little_once_a_second() -> None:
     for batch in batches(take, 10):
         began = time.process_time()
         online.push(batch)
-        between = time.process_time()
+        gap = time.process_time()
         online.compare_sensors()
-        pushed.append(between - began)
-        compared.append(time.process_time() - between)
+        pushed.append(gap - began)
+        compared.append(time.process_time() - gap)
     # a second has ten pushes; those until the sensors are calibrated are another matter
     second = np.add.reduceat(compared, np.arange(0, len(compared), 10))[30:-1]
     walked = second[second > 0.25 * second.max()]

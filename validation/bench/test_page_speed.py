@@ -74,13 +74,15 @@ class AnalysedWalk:
 
 @pytest.fixture(scope="module")
 def analysed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AnalysedWalk]:
-    made = simulate_scenario("comfortable", 3)
+    simulation = simulate_scenario("comfortable", 3)
     with served(tmp_path_factory.mktemp("pages") / "data") as service:
         client = service.client
         session = new_session(client, "P-1")
-        for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+        for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
             upload(client, session, name, content)
-        client.put(f"/api/v1/sessions/{session}/manifest", json={"sensors": dict(made.recording.segments)})
+        client.put(
+            f"/api/v1/sessions/{session}/manifest", json={"sensors": dict(simulation.recording.segments)}
+        )
         job = client.post(f"/api/v1/sessions/{session}/analyses", json={}).raise_for_status().json()
         assert wait_for(client, job["id"])["state"] == "done"
         yield AnalysedWalk(client, service.process.pid, session)
@@ -107,12 +109,12 @@ def test_session_page_comes_within_a_second_and_less_than_its_analysis(analysed:
 
 def test_eight_users_at_once_wait_for_each_other_and_for_nothing_else(analysed: AnalysedWalk) -> None:
     path = f"/sessions/{analysed.session}"
-    alone = visit(analysed.client, path, PAGES)
-    before = process_s(analysed.pid)
+    single = visit(analysed.client, path, PAGES)
+    initial = process_s(analysed.pid)
     with ThreadPoolExecutor(USERS) as pool:
         among = list(pool.map(lambda _: visit(analysed.client, path, PAGES), range(USERS)))
-    cpu_s = (process_s(analysed.pid) - before) / (USERS * PAGES)
-    one, eight = statistics.median(alone), statistics.median(t for times in among for t in times)
+    cpu_s = (process_s(analysed.pid) - initial) / (USERS * PAGES)
+    one, eight = statistics.median(single), statistics.median(t for times in among for t in times)
     sys.stdout.write(
         f"one {1e3 * one:.1f} ms, eight at once {1e3 * eight:.1f} ms, CPU {1e3 * cpu_s:.1f} ms a page\n"
     )
@@ -126,12 +128,12 @@ def test_eight_users_at_once_wait_for_each_other_and_for_nothing_else(analysed: 
         ("what", "goal", "ours", "met"),
         [
             [
-                what,
+                label,
                 "" if goal is None else f"≤ {goal:g} ms",
                 f"{1e3 * ours:.1f} ms",
                 "" if goal is None else "yes" if 1e3 * ours <= goal else "no",
             ]
-            for what, goal, ours in goals
+            for label, goal, ours in goals
         ],
         f"{PAGES} pages by each user, each asked for as soon as the one before is there, over loopback. The "
         "web process computes one page at a time, so eight wait some eight times as long as one.",
@@ -146,7 +148,7 @@ def test_eight_users_at_once_wait_for_each_other_and_for_nothing_else(analysed: 
 
 
 def visit(client: httpx.Client, path: str, times: int) -> list[float]:
-    """Ask for a page again and again over a connection of its own; seconds of each."""
+    """Request a page repeatedly over one connection; return the seconds of each."""
     took = []
     with httpx.Client(base_url=client.base_url, cookies=client.cookies, timeout=60) as own:
         for _ in range(times):
@@ -180,8 +182,8 @@ def test_the_drawing_of_the_figure_comes_with_the_page(analysed: AnalysedWalk) -
     content = middle(page, "first-contentful-paint")
     sys.stdout.write(f"{plain} {page} {figure}\n")
     if WHOLE:
-        before = "beside" if os.sched_getscheduler(0) == os.SCHED_OTHER else "before"  # as under `chrt -r 1`
-        shown = (
+        initial = "beside" if os.sched_getscheduler(0) == os.SCHED_OTHER else "before"  # as under `chrt -r 1`
+        view = (
             ("content", page, "first-contentful-paint", "≤ 0.3 s"),
             ("figure, drawn", page, "drawing", "≤ 1.5 s"),
             ("content, where software draws 3D", figure, "first-contentful-paint", ""),
@@ -192,10 +194,10 @@ def test_the_drawing_of_the_figure_comes_with_the_page(analysed: AnalysedWalk) -
             "A session page in the browser",
             ("first seen", "median", "range", "goal"),
             [
-                [what, f"{middle(times, name):.2f} s", spread(times, name), goal]
-                for what, times, name, goal in shown
+                [label, f"{middle(times, name):.2f} s", spread(times, name), goal]
+                for label, times, name, goal in view
             ],
-            f"From the request on, by a browser that was never there, {LOADS} loads, the bench {before} the "
+            f"From the request on, by a browser that was never there, {LOADS} loads, the bench {initial} the "
             f"other work of the machine (load {os.getloadavg()[0]:.0f}). The drawing is in the page and "
             "shows what 3D shows first. 3D by software (SwiftShader) on the same two cores is what a "
             "computer without a graphics card has.",
@@ -205,7 +207,7 @@ def test_the_drawing_of_the_figure_comes_with_the_page(analysed: AnalysedWalk) -
 
 
 def load(browser: Browser, client: httpx.Client, path: str, last: str) -> Marks:
-    """Open a page as somebody signed in who was never there, until it has a mark; its marks, ms."""
+    """Open a page as a new signed-in user until it sets a mark; return its marks, ms."""
     address = str(client.base_url)
     context = browser.new_context(base_url=address, viewport=DESK)
     context.add_cookies([{"name": k, "value": v, "url": address} for k, v in client.cookies.items()])
@@ -214,8 +216,8 @@ def load(browser: Browser, client: httpx.Client, path: str, last: str) -> Marks:
     if last != "figure":
         page.route("**/views/**", lambda route: route.abort())
     page.goto(path)
-    wanted = ["first-contentful-paint", last]  # the first is told a while after it was seen
-    page.wait_for_function("(names) => names.every((n) => n in window.marks)", arg=wanted, timeout=60_000)
+    expected = ["first-contentful-paint", last]  # the first is told a while after it was seen
+    page.wait_for_function("(names) => names.every((n) => n in window.marks)", arg=expected, timeout=60_000)
     marks: Marks = page.evaluate("() => window.marks")
     if "drawing" in marks:  # the frame was made by then; on the screen it is with the first content, or later
         marks["drawing"] = max(marks["drawing"], marks["first-contentful-paint"])
@@ -229,5 +231,5 @@ def middle(times: list[Marks], name: str) -> float:
 
 
 def spread(times: list[Marks], name: str) -> str:
-    found = [t[name] / 1e3 for t in times]
-    return f"{min(found):.2f} to {max(found):.2f} s"
+    result = [t[name] / 1e3 for t in times]
+    return f"{min(result):.2f} to {max(result):.2f} s"

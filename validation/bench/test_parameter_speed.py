@@ -42,7 +42,7 @@ def test_all_parameters_of_ten_minutes_are_there_at_once() -> None:
         began = time.process_time()
         take_figures(measured.strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk)
         figures.append(time.process_time() - began)
-    found = {"parameters": statistics.median(figures), "with events and strides": statistics.median(whole)}
-    sys.stdout.write(f"{len(measured.strides.strides)} strides, CPU s {found}\n")
+    result = {"parameters": statistics.median(figures), "with events and strides": statistics.median(whole)}
+    sys.stdout.write(f"{len(measured.strides.strides)} strides, CPU s {result}\n")
     assert statistics.median(figures) <= BUSY * LIMIT_S
     assert statistics.median(whole) <= BUSY * LIMIT_S

@@ -37,16 +37,16 @@ async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -
 
 
 def moves() -> list[tuple[float, float]]:
-    """One contact moved by a millisecond again and again: where it lies, and where to."""
+    """One contact moved by a millisecond repeatedly: from, to."""
     contact = walk.events(TAKE_S).times("left", "ic")[100]
     places = [contact + 0.001 * i for i in range(EDITS + 1)]
     return list(pairwise(places))
 
 
-def measure_with(tracks: Tracks, at: float, to: float) -> None:
+def measure_with(tracks: Tracks, position: float, to: float) -> None:
     """Measure the whole take with one contact moved."""
-    found = measure_gait(tracks, [Edit("move_event", "left", at, "ic", to)])
-    assert len(found.strides.strides) > 1000
+    gait = measure_gait(tracks, [Edit("move_event", "left", position, "ic", to)])
+    assert len(gait.strides.strides) > 1000
 
 
 def test_ten_minutes_are_measured_again_for_seven_pieces_of_plain_python() -> None:
@@ -76,22 +76,22 @@ async def test_an_edit_and_all_its_numbers_cost_little_more_than_measuring_once(
         review = await client.get(f"{path}/edits")
         assert opened.is_success
         tracks, steps, rows = walk.tracks(TAKE_S), moves(), []
-        for at, to in steps:
-            body = {"kind": "move_event", "side": "left", "event": "ic", "time_s": at, "to_s": to}
-            once = cpu_s(functools.partial(measure_with, tracks, steps[0][0], to))
+        for moment, to in steps:
+            body = {"kind": "move_event", "side": "left", "event": "ic", "time_s": moment, "to_s": to}
+            single = cpu_s(functools.partial(measure_with, tracks, steps[0][0], to))
             edit = await spent("POST", f"{path}/edits", json=body)
             numbers = await spent(
                 "GET", f"/sessions/{session}/timeline/numbers", headers={FRAGMENT: "numbers"}
             )
             report = await spent("GET", f"{path}/report")
-            rows.append((once, edit, numbers, report))
+            rows.append((single, edit, numbers, report))
         undone = await client.request("DELETE", f"{path}/edits")
         assert undone.is_success
-    once, edit, numbers, report = (1000 * statistics.median(column) for column in zip(*rows, strict=True))
+    single, edit, numbers, report = (1000 * statistics.median(column) for column in zip(*rows, strict=True))
     ratio = statistics.median((r[1] + r[2]) / r[0] for r in rows)
     sys.stdout.write(
-        f"\nCPU: measuring {once:.0f} ms, edit {edit:.0f} ms, numbers {numbers:.0f} ms, report {report:.0f} "
-        f"ms; edit and numbers {ratio:.2f} times measuring; page {len(opened.content)} bytes, review "
+        f"\nCPU: measuring {single:.0f} ms, edit {edit:.0f} ms, numbers {numbers:.0f} ms, report {report:.0f}"
+        f" ms; edit and numbers {ratio:.2f} times measuring; page {len(opened.content)} bytes, review "
         f"{len(review.content)} bytes\n"
     )
     record_goal("edit in ten minutes and all its numbers, CPU", 80.0, edit + numbers, "ms")

@@ -27,7 +27,7 @@ STANDING = dict.fromkeys(NAMES, 2.0)
 
 @pytest.fixture(scope="module")
 def curves() -> CycleCurves:
-    """As many curves as seven sensors give; what is in them does not change the work."""
+    """As many curves as from seven sensors; their content does not affect the cost."""
     rng = np.random.default_rng(0)
     variables = (*NINE, "knee_adduction", "knee_rotation", "ankle_inversion", "ankle_rotation")
     return CycleCurves(
@@ -39,14 +39,14 @@ def curves() -> CycleCurves:
 
 
 def best(run: Callable[[], object], times: int = 15) -> float:
-    """Shortest wall time in s: what the work costs when nothing else wants the core."""
+    """Shortest wall time in s, without competing load."""
     run()
-    found = []
+    result = []
     for _ in range(times):
         start = time.perf_counter()
         run()
-        found.append(time.perf_counter() - start)
-    return min(found)
+        result.append(time.perf_counter() - start)
+    return min(result)
 
 
 def test_all_scores_take_less_than_twenty_milliseconds(curves: CycleCurves) -> None:

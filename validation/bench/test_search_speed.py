@@ -38,13 +38,13 @@ async def test_a_search_among_ten_thousand_visits_answers_at_once(tmp_path: Path
         async with clinic.client("admin") as client:
             code = (await client.get("/api/v1/patients")).json()[-1]["code"]
             quickest = {}
-            for what, path in ASKED.items():
+            for label, path in ASKED.items():
                 took = []
                 for _ in range(TIMES):
                     began = time.perf_counter()
                     (await client.get(path.format(code=code))).raise_for_status()
                     took.append(time.perf_counter() - began)
-                quickest[what] = min(took)
-    found = ", ".join(f"{what} {1e3 * s:.0f} ms" for what, s in quickest.items())
-    sys.stdout.write(f"{'PostgreSQL' if url else 'SQLite'}: {found}\n")
+                quickest[label] = min(took)
+    text = ", ".join(f"{label} {1e3 * s:.0f} ms" for label, s in quickest.items())
+    sys.stdout.write(f"{'PostgreSQL' if url else 'SQLite'}: {text}\n")
     assert max(quickest.values()) <= SEARCH_S

@@ -1,4 +1,4 @@
-"""What the self-calibrating filter costs beside VQF, which estimates less, in one run."""
+"""Cost of the self-calibrating filter relative to VQF, which estimates less, in one run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the sensitivity analysis of a squat costs, against plain Python in the same run."""
+"""Cost of the sensitivity analysis of a squat, against plain Python in the same run."""
 
 from __future__ import annotations
 

@@ -52,9 +52,11 @@ def _read(clinic: Clinic, patient: patients.Patient) -> float:
     began = time.perf_counter()
     with clinic.db.read() as c:
         done, plans = histories.read(c, patient)
-    known = histories.read_history(clinic.app.state.reviewed, patient, done, plans)
-    found = follow_figures(known.visits, names_in(known.visits), known.norms, known.usual)
+    known_history = histories.read_history(clinic.app.state.reviewed, patient, done, plans)
+    figures = follow_figures(
+        known_history.visits, names_in(known_history.visits), known_history.norms, known_history.usual
+    )
     took = time.perf_counter() - began
-    assert len(known.visits) == VISITS
-    assert len(found) > 20
+    assert len(known_history.visits) == VISITS
+    assert len(figures) > 20
     return took

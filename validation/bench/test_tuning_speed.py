@@ -48,10 +48,10 @@ def test_all_cores_work(trial: ReferenceTrial) -> None:
     split = TrialSplit((trial,), (read_trial("other", trial_bytes(3.0)),))
     tuner = GainTuner("mahony_2008", split, rules=SwarmRules(16, 2, 1, 1))
     tuner.run(lambda *_: None)
-    alone, together = [], []
+    single, together = [], []
     # interleaved, so that a busy moment of the machine meets both
     for _ in range(8):
-        alone.append(best(lambda: tuner.run(lambda *_: None), 1))
+        single.append(best(lambda: tuner.run(lambda *_: None), 1))
         together.append(best(lambda: tunings.search(tuner, lambda *_: None, None), 1))
-    print(f"\none thread {min(alone):.2f} s, a thread per core {min(together):.2f} s")
-    assert min(together) < 0.8 * min(alone)
+    print(f"\none thread {min(single):.2f} s, a thread per core {min(together):.2f} s")
+    assert min(together) < 0.8 * min(single)

@@ -1,4 +1,4 @@
-"""What a 3D figure costs the web process at 30 frames a second, live and as a replay, by viewers."""
+"""Cost of a 3D view in the web process at 30 frames/s, live and replay, by viewers."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def view() -> Iterator[viser.ViserServer]:
 
 
 def live(server: viser.ViserServer) -> Callable[[int], object]:
-    """A live figure with the norm beside it, fed as the hub feeds it."""
+    """Live avatar with the norm, fed like by the hub."""
     norm = {name: np.radians(band.mean_deg) for name, band in adult_kinematics(None).bands.items()}
     watch = LiveWatch(
         LiveFigure(server, walk.BODY),
@@ -97,8 +97,8 @@ def live(server: viser.ViserServer) -> Callable[[int], object]:
         strides=lambda: (),
         watched=lambda: True,
     )
-    said = [picture(i) for i in range(len(POSES.t_s))]
-    return lambda i: watch.see(said[i])
+    pictures = [picture(i) for i in range(len(POSES.t_s))]
+    return lambda i: watch.see(pictures[i])
 
 
 def replay(server: viser.ViserServer) -> Callable[[int], object]:

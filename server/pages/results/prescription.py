@@ -28,7 +28,7 @@ router = APIRouter(include_in_schema=False, default_response_class=HTMLResponse)
 FIRST: Final = "step_length_m"
 """Default parameter: step length, trained in most studies."""
 
-ON_CARD: Final = ("Target", "Shown as", "Schedule", "Level", "Ends")
+ON_CARD: Final = ("Target", "Display name", "Schedule", "Level", "Ends")
 
 MODES: Final = (
     ("bar", "Bar", "height shows the value, target marked"),

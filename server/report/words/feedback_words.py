@@ -64,7 +64,7 @@ def prescription_words(content: Prescription) -> list[tuple[str, str]]:
         ("Trained", name_target(content)),
         ("Target", target_words(content)),
         ("Zone", _zone(content)),
-        ("Shown as", _shown(content)),
+        ("Display name", _shown(content)),
         ("Schedule", schedule_words(content)),
         ("Level", _level(content)),
         ("Ends", _ends(content)),

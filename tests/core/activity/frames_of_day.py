@@ -1,4 +1,4 @@
-"""Frames of a worn sensor as the tests of the monitor's parts need them."""
+"""Frames of a sensor for tests of the monitor's parts."""
 
 from __future__ import annotations
 

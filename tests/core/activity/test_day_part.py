@@ -1,4 +1,4 @@
-"""One day of frames: inclination with its sign, what is clipped to the day, what a neighbour lends."""
+"""One day of frames: signed inclination, clipping to the day, baseline of a neighbour."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TOPS_S = (20.0, 40.0, 60.0)
 
 
 def leaning(*, first: int = 0, still: bool = True) -> Frames:
-    """Two minutes in which somebody stands, and bows three times for a moment."""
+    """Two minutes of standing with three short bows."""
     frames = make_frames(2 * PER_MINUTE, first)
     if still:
         frames.spread[:100] = 0.0
@@ -71,12 +71,12 @@ def test_what_lies_around_a_day_has_its_own_time() -> None:
 
 def test_without_walking_or_rest_upright_is_lent_or_not_known() -> None:
     restless = leaning(still=False)
-    alone = read(restless)
-    assert alone.periods[0].method == "none"
-    assert alone.no_baseline == ((0.0, 120.0),)
-    assert np.isnan(alone.inclination_deg).all()
-    before = replace(read(leaning()).periods[0], up=(0.0, 0.0, 1.0))
-    lent = read(restless, before=before)
+    single_content = read(restless)
+    assert single_content.periods[0].method == "none"
+    assert single_content.no_baseline == ((0.0, 120.0),)
+    assert np.isnan(single_content.inclination_deg).all()
+    initial_variant = replace(read(leaning()).periods[0], up=(0.0, 0.0, 1.0))
+    lent = read(restless, before=initial_variant)
     assert lent.periods[0].method == "neighbour"
     assert lent.no_baseline == ()
     assert lent.inclination_deg[20] == pytest.approx(LEAN_DEG, abs=5.0)

@@ -19,11 +19,11 @@ def test_what_was_appended_is_seen_in_order() -> None:
     fill(store, 600, 2.0)
     fill(store, 300, 3.0)
     assert store.end == 1500
-    seen = store.view(1300)
-    assert seen.first == 0
-    assert len(seen.valid) == len(seen.gravity) == len(seen.up) == 1300
-    assert seen.spread[[0, 599, 600, 1199, 1200]].tolist() == [1.0, 1.0, 2.0, 2.0, 3.0]
-    assert seen.sd[:, 0].tolist() == seen.wobble[:, 2].tolist() == [1.0, 2.0, 3.0]
+    view = store.view(1300)
+    assert view.first == 0
+    assert len(view.valid) == len(view.gravity) == len(view.up) == 1300
+    assert view.spread[[0, 599, 600, 1199, 1200]].tolist() == [1.0, 1.0, 2.0, 2.0, 3.0]
+    assert view.sd[:, 0].tolist() == view.wobble[:, 2].tolist() == [1.0, 2.0, 3.0]
     assert len(store.view(1200).sd) == 2
     assert len(store.view(9999).valid) == 1500, "not beyond what is kept"
 
@@ -35,10 +35,10 @@ def test_dropped_frames_make_room_and_the_rest_keeps_its_numbers() -> None:
     store.drop_before(600)
     assert store.end == 1800
     fill(store, 600, 4.0)
-    seen = store.view(store.end)
-    assert (seen.first, len(seen.valid)) == (600, 1800)
-    assert seen.spread[[0, 600, 1200]].tolist() == [2.0, 3.0, 4.0]
-    assert seen.sd[:, 1].tolist() == [2.0, 3.0, 4.0]
+    view = store.view(store.end)
+    assert (view.first, len(view.valid)) == (600, 1800)
+    assert view.spread[[0, 600, 1200]].tolist() == [2.0, 3.0, 4.0]
+    assert view.sd[:, 1].tolist() == [2.0, 3.0, 4.0]
 
 
 def test_dropping_again_or_too_early_changes_nothing() -> None:
@@ -49,8 +49,8 @@ def test_dropping_again_or_too_early_changes_nothing() -> None:
     assert store.view(900).first == 0
     for _ in range(2):
         store.drop_before(600)
-        seen = store.view(900)
-        assert (seen.first, seen.spread.tolist(), seen.sd[:, 0].tolist()) == (600, [2.0] * 300, [2.0])
+        view = store.view(900)
+        assert (view.first, view.spread.tolist(), view.sd[:, 0].tolist()) == (600, [2.0] * 300, [2.0])
     store.drop_before(6000)
     assert store.end == 900
     assert len(store.view(900).valid) == 0

@@ -1,4 +1,4 @@
-"""The monitor of daily life on simulated people: what they did is known."""
+"""Daily-life monitor on simulated people with known activities."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def simulate_chest(day: Day, seed: int = 0, style: ChestStyle | None = None) -> 
     return simulate_day(day, seed=seed, setup=replace(ON_SKIN, rate_hz=50.0), style=style)
 
 
-def watch(made: ChestSimulation) -> ActivityResult:
-    (stream,) = made.recording.streams.values()
+def watch(result: ChestSimulation) -> ActivityResult:
+    (stream,) = result.recording.streams.values()
     return monitor_activity(as_long_stream(stream), "chest", 1.75)
 
 
@@ -77,12 +77,12 @@ def cut(stream: LongStream, blocks: list[SampleBlock], rows: int) -> LongStream:
 @pytest.mark.slow
 @pytest.mark.parametrize(("lean", "takes"), [(25.0, 1.5), (35.0, 2.5), (45.0, 3.5)])
 def test_all_transitions_are_found_near_their_time(lean: float, takes: float) -> None:
-    made = simulate_chest(CHAIR, 1, ChestStyle(lean_rad=radians(lean), change_s=takes))
-    true = [p for p in made.truth.phases if "_to_" in p.kind]
-    found = watch(made)
-    assert [t.kind for t in found.transitions] == [p.kind for p in true]
-    assert all(t.consistent for t in found.transitions)
-    for t, p in zip(found.transitions, true, strict=True):
+    chest = simulate_chest(CHAIR, 1, ChestStyle(lean_rad=radians(lean), change_s=takes))
+    true = [p for p in chest.truth.phases if "_to_" in p.kind]
+    watch_result = watch(chest)
+    assert [t.kind for t in watch_result.transitions] == [p.kind for p in true]
+    assert all(t.consistent for t in watch_result.transitions)
+    for t, p in zip(watch_result.transitions, true, strict=True):
         assert p.start_s - 0.5 <= t.time_s <= p.end_s + 0.5
         if t.rise_m is not None:
             assert abs(t.rise_m) == pytest.approx(0.4, abs=0.08)
@@ -95,41 +95,41 @@ def test_a_bow_is_no_transition() -> None:
         PostureHold("bow", 3.0),
         PostureHold("stand", 4.0),
     )
-    found = watch(simulate_chest((*day, PostureHold("bow", 2.5), PostureHold("stand", 4.0)), 2))
-    assert not found.transitions
-    assert [c.refused for c in found.candidates] == ["chest_did_not_rise"] * 2
-    assert {s.kind for s in found.spans} == {"walking", "standing"}
+    watch_result = watch(simulate_chest((*day, PostureHold("bow", 2.5), PostureHold("stand", 4.0)), 2))
+    assert not watch_result.transitions
+    assert [c.refused for c in watch_result.candidates] == ["chest_did_not_rise"] * 2
+    assert {s.kind for s in watch_result.spans} == {"walking", "standing"}
 
 
 def test_a_careful_lean_is_told_as_a_candidate_and_settles_the_posture() -> None:
-    made = simulate_chest(CHAIR, 3, ChestStyle(lean_rad=radians(15.0)))
-    found = watch(made)
-    assert {t.kind for t in found.transitions} == {"sit_to_lie", "lie_to_sit"}
-    true = [p.kind for p in made.truth.phases if p.kind in ("sit_to_stand", "stand_to_sit")]
-    assert [c.likely for c in found.sub_threshold] == true
+    chest = simulate_chest(CHAIR, 3, ChestStyle(lean_rad=radians(15.0)))
+    watch_result = watch(chest)
+    assert {t.kind for t in watch_result.transitions} == {"sit_to_lie", "lie_to_sit"}
+    true = [p.kind for p in chest.truth.phases if p.kind in ("sit_to_stand", "stand_to_sit")]
+    assert [c.likely for c in watch_result.sub_threshold] == true
 
 
 def test_the_steps_are_counted_and_lie_in_the_walk() -> None:
-    made = simulate_chest(
+    chest = simulate_chest(
         (PostureHold("stand", 5.0), PostureHold("walk", 20.0, 108.0), PostureHold("stand", 5.0)), 4
     )
-    found = watch(made)
-    assert abs(len(found.steps_s) - len(made.truth.steps_s)) <= 1
-    (bout,) = found.bouts
+    watch_result = watch(chest)
+    assert abs(len(watch_result.steps_s) - len(chest.truth.steps_s)) <= 1
+    (bout,) = watch_result.bouts
     assert bout.kind == "walking"
     assert bout.cadence_spm == pytest.approx(108.0, rel=0.03)
 
 
 def test_inclination_is_positive_forward() -> None:
-    made = simulate_chest(MOVEMENTS["chair_rises"].does, 5)  # type: ignore[arg-type]
-    found = watch(made)
-    true = np.degrees(made.truth.pitch_rad)
+    chest = simulate_chest(MOVEMENTS["chair_rises"].does, 5)  # type: ignore[arg-type]
+    watch_result = watch(chest)
+    true = np.degrees(chest.truth.pitch_rad)
     seconds = true[: 50 * (len(true) // 50)].reshape(-1, 50).mean(axis=1)
-    both = found.inclination_deg[: len(seconds)] - np.nanmedian(
-        found.inclination_deg[: len(seconds)] - seconds
+    pair = watch_result.inclination_deg[: len(seconds)] - np.nanmedian(
+        watch_result.inclination_deg[: len(seconds)] - seconds
     )
-    assert np.nanmax(np.abs(both - seconds)) < 6.0
-    assert np.nanmax(found.inclination_deg) > 15.0
+    assert np.nanmax(np.abs(pair - seconds)) < 6.0
+    assert np.nanmax(watch_result.inclination_deg) > 15.0
 
 
 @pytest.mark.slow
@@ -137,11 +137,11 @@ def test_inclination_is_positive_forward() -> None:
 def test_how_the_blocks_are_cut_changes_no_bit(
     life: DailySimulation, blocks: list[SampleBlock], lived: ActivityResult, rows: int
 ) -> None:
-    again = monitor_activity(cut(life.stream, blocks, rows), "chest", 1.68)
+    second_activity = monitor_activity(cut(life.stream, blocks, rows), "chest", 1.68)
     for name in ("spans", "transitions", "candidates", "bouts", "turns", "hours", "days", "periods"):
-        assert getattr(again, name) == getattr(lived, name)
-    assert again.steps_s.tobytes() == lived.steps_s.tobytes()
-    assert again.inclination_deg.tobytes() == lived.inclination_deg.tobytes()
+        assert getattr(second_activity, name) == getattr(lived, name)
+    assert second_activity.steps_s.tobytes() == lived.steps_s.tobytes()
+    assert second_activity.inclination_deg.tobytes() == lived.inclination_deg.tobytes()
 
 
 @pytest.mark.slow
@@ -168,11 +168,11 @@ def test_without_the_gyroscope_the_same_is_found(
     life: DailySimulation, blocks: list[SampleBlock], lived: ActivityResult
 ) -> None:
     bare = [SampleBlock(b.t_s, b.acc, None) for b in blocks]
-    alone = replace(life.stream, has_gyro=False, open_blocks=lambda: iter(bare))
-    found = monitor_activity(alone, "chest", 1.68)
-    assert [t.kind for t in found.transitions] == [t.kind for t in lived.transitions]
-    assert found.steps_s.tobytes() == lived.steps_s.tobytes()
-    assert not found.turns
+    single_variant = replace(life.stream, has_gyro=False, open_blocks=lambda: iter(bare))
+    activity = monitor_activity(single_variant, "chest", 1.68)
+    assert [t.kind for t in activity.transitions] == [t.kind for t in lived.transitions]
+    assert activity.steps_s.tobytes() == lived.steps_s.tobytes()
+    assert not activity.turns
 
 
 def test_a_sensor_on_the_table_and_a_hole_are_told_apart_from_sitting() -> None:
@@ -185,14 +185,14 @@ def test_a_sensor_on_the_table_and_a_hole_are_told_apart_from_sitting() -> None:
 
     def open_blocks() -> Iterator[SampleBlock]:
         for b in life.stream.open_blocks():
-            there = (b.t_s < hole[0]) | (b.t_s >= hole[1])
-            yield SampleBlock(b.t_s[there], b.acc[there], None)
+            target = (b.t_s < hole[0]) | (b.t_s >= hole[1])
+            yield SampleBlock(b.t_s[target], b.acc[target], None)
 
-    found = monitor_activity(replace(life.stream, open_blocks=open_blocks), "chest", 1.7)
-    assert found.minutes("gap") == pytest.approx(0.5, abs=0.02)
-    assert found.minutes("non_wear") == pytest.approx(40.0, abs=1.0)
-    assert found.minutes("sitting") == pytest.approx(41.5, abs=1.5)
-    assert [p.method for p in found.periods] == ["walking", "walking"]
+    activity = monitor_activity(replace(life.stream, open_blocks=open_blocks), "chest", 1.7)
+    assert activity.minutes("gap") == pytest.approx(0.5, abs=0.02)
+    assert activity.minutes("non_wear") == pytest.approx(40.0, abs=1.0)
+    assert activity.minutes("sitting") == pytest.approx(41.5, abs=1.5)
+    assert [p.method for p in activity.periods] == ["walking", "walking"]
 
 
 def test_hours_and_days_are_those_of_the_devices_clock(
@@ -200,9 +200,9 @@ def test_hours_and_days_are_those_of_the_devices_clock(
 ) -> None:
     start = dt.datetime(2026, 3, 4, 23, 10)  # noqa: DTZ001 - the device's own clock
     clocked = replace(life.stream, started_at=start, open_blocks=lambda: iter(blocks))
-    found = monitor_activity(clocked, "chest", 1.68)
-    assert found.hours[0].end_s == 50 * 60.0
-    assert [d.date for d in found.days] == [dt.date(2026, 3, 4), dt.date(2026, 3, 5)]
+    activity = monitor_activity(clocked, "chest", 1.68)
+    assert activity.hours[0].end_s == 50 * 60.0
+    assert [d.date for d in activity.days] == [dt.date(2026, 3, 4), dt.date(2026, 3, 5)]
 
 
 def still(rate: float, seconds: float = 60.0) -> LongStream:
@@ -219,10 +219,10 @@ def test_too_slow_a_recording_is_refused_with_what_is_needed() -> None:
 
 
 def test_what_is_assumed_is_said() -> None:
-    found = monitor_activity(still(25.0), "chest")
-    assert {n.code for n in found.notices} == {"height_assumed", "baseline_assumed", "forward_unknown"}
-    assert np.isnan(found.inclination_deg).all()
-    assert [(s.kind, s.evidence) for s in found.spans] == [("unknown", "nothing_known")]
+    activity = monitor_activity(still(25.0), "chest")
+    assert {n.code for n in activity.notices} == {"height_assumed", "baseline_assumed", "forward_unknown"}
+    assert np.isnan(activity.inclination_deg).all()
+    assert [(s.kind, s.evidence) for s in activity.spans] == [("unknown", "nothing_known")]
 
 
 def test_samples_without_numbers_are_an_error() -> None:
@@ -235,32 +235,32 @@ def test_other_slabs_find_the_same_transitions(
     life: DailySimulation, blocks: list[SampleBlock], lived: ActivityResult
 ) -> None:
     stream = replace(life.stream, open_blocks=lambda: iter(blocks))
-    found = monitor_activity(stream, "chest", 1.68, ActivityParams(slab_s=300))
-    assert [t.kind for t in found.transitions] == [t.kind for t in lived.transitions]
-    assert abs(len(found.steps_s) - len(lived.steps_s)) <= 2
+    activity = monitor_activity(stream, "chest", 1.68, ActivityParams(slab_s=300))
+    assert [t.kind for t in activity.transitions] == [t.kind for t in lived.transitions]
+    assert abs(len(activity.steps_s) - len(lived.steps_s)) <= 2
 
 
 def test_every_hour_is_told_while_it_goes_on() -> None:
     t = np.arange(4 * 3600 * 25) / 25.0
     acc = np.tile([0.0, 0.0, GRAVITY], (len(t), 1))
     stream = LongStream("A", "a", 25.0, False, 4 * 3600.0, lambda: iter([SampleBlock(t, acc, None)]))
-    told: list[tuple[str, float]] = []
+    notices: list[tuple[str, float]] = []
     source = Recording({}, {"A": "chest"}, Subject(1.7), "activity", long={"A": stream})
-    analyse(source, progress=lambda stage, share: told.append((stage, share)))
-    shares = [share for stage, share in told if stage == "activity"]
+    analyse(source, progress=lambda stage, share: notices.append((stage, share)))
+    shares = [share for stage, share in notices if stage == "activity"]
     # the fourth hour ends with the recording, a sample early: the next stage tells that
     assert shares == pytest.approx([0.0, 0.2375, 0.475, 0.7125])
-    assert told[-2:] == [("quality", 0.95), ("done", 1.0)]
+    assert notices[-2:] == [("quality", 0.95), ("done", 1.0)]
 
 
 @pytest.mark.parametrize("lost", [0.0, np.nan])
 def test_samples_that_were_not_measured_are_a_hole(lost: float) -> None:
-    made = simulate_chest(CHAIR)
-    (stream,) = made.recording.streams.values()
+    chest = simulate_chest(CHAIR)
+    (stream,) = chest.recording.streams.values()
     half = np.arange(len(stream.t_s)) < len(stream.t_s) // 2
     acc, gyr = (np.where(half[:, None], x, lost) for x in (stream.acc, stream.gyr) if x is not None)
-    found = monitor_activity(as_long_stream(replace(stream, acc=acc, gyr=gyr), 100), "chest", 1.75)
-    assert found.steps_s.max(initial=0.0) < stream.t_s[len(stream.t_s) // 2]
+    activity = monitor_activity(as_long_stream(replace(stream, acc=acc, gyr=gyr), 100), "chest", 1.75)
+    assert activity.steps_s.max(initial=0.0) < stream.t_s[len(stream.t_s) // 2]
     nothing = replace(stream, acc=np.full_like(stream.acc, lost))
     with pytest.raises(SignalError, match="no complete sample"):
         monitor_activity(as_long_stream(nothing, 100), "chest", 1.75)

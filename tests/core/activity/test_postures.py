@@ -6,8 +6,8 @@ from sagittal.core.activity.postures import FixedStretch, decide_postures
 from sagittal.core.activity.result import PosturalTransition, TransitionCandidate, TransitionKind
 
 
-def rise(kind: TransitionKind, at: float) -> PosturalTransition:
-    return PosturalTransition(kind, at, at - 1.0, at + 1.0, 30.0, 0.4)
+def rise(kind: TransitionKind, position: float) -> PosturalTransition:
+    return PosturalTransition(kind, position, position - 1.0, position + 1.0, 30.0, 0.4)
 
 
 WALKS = (FixedStretch(0.0, 10.0, "walking", "steps"), FixedStretch(90.0, 100.0, "walking", "steps"))
@@ -18,8 +18,8 @@ def decide(
     candidates: list[TransitionCandidate] | None = None,
     limit: float = 1e9,
 ) -> tuple[list[tuple[str, float | None]], list[bool]]:
-    spans, judged = decide_postures(100.0, WALKS, [], transitions, candidates or [], limit)
-    return [(s.kind, s.confidence) for s in spans[1:-1]], [t.consistent for t in judged]
+    spans, verdict = decide_postures(100.0, WALKS, [], transitions, candidates or [], limit)
+    return [(s.kind, s.confidence) for s in spans[1:-1]], [t.consistent for t in verdict]
 
 
 def test_both_ends_agree_on_standing_and_sitting() -> None:

@@ -39,8 +39,8 @@ def resting(seconds: float) -> tuple[Floats, Floats]:
     return t_s, np.tile([0.0, 3.0, 4.0], (len(t_s), 1))
 
 
-def reduce(given: LongStream) -> list[Slab]:
-    return list(reduce_stream(given, "chest", PARAMS))
+def reduce(inputs: LongStream) -> list[Slab]:
+    return list(reduce_stream(inputs, "chest", PARAMS))
 
 
 def test_a_resting_sensor_gives_its_own_gravity_in_slabs_of_one_length() -> None:
@@ -62,8 +62,8 @@ def test_a_resting_sensor_gives_its_own_gravity_in_slabs_of_one_length() -> None
 
 def test_a_hole_leaves_frames_that_are_not_valid_and_a_slab_of_nothing_is_empty() -> None:
     t_s, acc = resting(200)
-    kept = (t_s < 30.0) | (t_s >= 130.0)
-    slabs = reduce(stream(t_s[kept], acc[kept], rows=77))
+    retained = (t_s < 30.0) | (t_s >= 130.0)
+    slabs = reduce(stream(t_s[retained], acc[retained], rows=77))
     valid = np.concatenate([s.frames.valid for s in slabs])
     assert len(valid) == 2000
     assert valid[:298].all()
@@ -76,8 +76,8 @@ def test_a_hole_leaves_frames_that_are_not_valid_and_a_slab_of_nothing_is_empty(
 def test_blocks_do_not_matter() -> None:
     t_s, acc = resting(100)
     acc = acc + np.sin(t_s)[:, None]
-    one, other = reduce(stream(t_s, acc)), reduce(stream(t_s, acc, rows=33))
-    for a, b in zip(one, other, strict=True):
+    one, second = reduce(stream(t_s, acc)), reduce(stream(t_s, acc, rows=33))
+    for a, b in zip(one, second, strict=True):
         np.testing.assert_array_equal(a.frames.gravity, b.frames.gravity)
         np.testing.assert_array_equal(a.frames.spread, b.frames.spread)
 
@@ -113,7 +113,7 @@ def test_up_follows_the_gyroscope_and_loses_its_bias_while_quiet() -> None:
     acc = GRAVITY * up
     acc[t >= 2.0] += np.array([8.0, 0.0, 0.0])
     bias = np.array([0.02, -0.03, 0.04])
-    found = follow_up(acc, gyr + bias, up, 50.0)
-    assert np.linalg.norm(found, axis=1) == pytest.approx(1.0)
-    angle = np.degrees(np.arccos(np.clip((found * up).sum(axis=1), -1.0, 1.0)))
+    result = follow_up(acc, gyr + bias, up, 50.0)
+    assert np.linalg.norm(result, axis=1) == pytest.approx(1.0)
+    angle = np.degrees(np.arccos(np.clip((result * up).sum(axis=1), -1.0, 1.0)))
     assert angle.max() < 3.0

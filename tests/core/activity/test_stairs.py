@@ -1,4 +1,4 @@
-"""Stairs are told from level walking by limits of one's own."""
+"""Stairs distinguished from level walking by personal limits."""
 
 from __future__ import annotations
 

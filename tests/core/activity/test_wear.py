@@ -1,4 +1,4 @@
-"""Wear: what counts as a hole or as off, to the frame, and where up and forward are."""
+"""Wear: gaps and removal to the frame, upright and forward directions."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ WORN = WearParams()
 UPRIGHT = UprightParams()
 
 
-def laid_down(minutes: int, first: int = 10, of: int = 60) -> Frames:
-    """An hour in which the sensor lies still for so many minutes."""
-    frames = make_frames(of * PER_MINUTE)
+def laid_down(minutes: int, first: int = 10, source: int = 60) -> Frames:
+    """An hour with the sensor removed for so many minutes."""
+    frames = make_frames(source * PER_MINUTE)
     frames.sd[first : first + minutes] = frames.wobble[first : first + minutes] = 0.0
     return frames
 
 
 def test_what_lies_still_for_half_an_hour_is_off() -> None:
-    found = find_wear(laid_down(30), WORN)
-    assert found.off == ((6000, 24000),)
-    assert found.worn == ((0, 6000), (24000, 36000))
-    assert found.gaps == ()
+    wear = find_wear(laid_down(30), WORN)
+    assert wear.off == ((6000, 24000),)
+    assert wear.worn == ((0, 6000), (24000, 36000))
+    assert wear.gaps == ()
     assert find_wear(laid_down(29), WORN) == Wear((), (), ((0, 36000),))
 
 
@@ -66,10 +66,10 @@ def test_a_hole_of_two_seconds_is_a_gap_and_never_off() -> None:
     frames.valid[100:119] = False
     frames.valid[200:220] = False
     frames.valid[7000:7100] = False
-    found = find_wear(frames, WORN)
-    assert found.gaps == ((200, 220), (7000, 7100))
-    assert found.off == ((6000, 7000), (7100, 24000))
-    assert found.worn == ((0, 200), (220, 6000), (24000, 36000))
+    wear = find_wear(frames, WORN)
+    assert wear.gaps == ((200, 220), (7000, 7100))
+    assert wear.off == ((6000, 7000), (7100, 24000))
+    assert wear.worn == ((0, 200), (220, 6000), (24000, 36000))
 
 
 def test_periods_are_parted_by_half_an_hour() -> None:
@@ -130,16 +130,16 @@ def lean(*tops_deg: tuple[float, float]) -> Singles:
 def test_forward_is_where_at_least_two_leans_go(
     leans: tuple[tuple[float, float], ...], forward: tuple[float, ...] | None, count: int
 ) -> None:
-    at = [(3 * i, 3 * i + 1, 3 * i + 2) for i in range(len(leans))]
-    found, seen = find_forward(lean(*leans), np.array([0.0, 0.0, 1.0]), at, UPRIGHT)
-    assert seen == count
-    assert found is None if forward is None else found == pytest.approx(forward, abs=1e-6)
+    position = [(3 * i, 3 * i + 1, 3 * i + 2) for i in range(len(leans))]
+    result, observations = find_forward(lean(*leans), np.array([0.0, 0.0, 1.0]), position, UPRIGHT)
+    assert observations == count
+    assert result is None if forward is None else result == pytest.approx(forward, abs=1e-6)
 
 
 def test_a_period_is_described_in_plain_numbers() -> None:
-    told = describe_period(1.0, 2.0, np.array([0.0, 0.0, 1.0]), None, "walking", 3)
-    assert (told.start_s, told.end_s, told.up, told.forward) == (1.0, 2.0, (0.0, 0.0, 1.0), None)
-    assert (told.method, told.leans) == ("walking", 3)
-    assert replace(told, forward=(1.0, 0.0, 0.0)) == describe_period(
+    text = describe_period(1.0, 2.0, np.array([0.0, 0.0, 1.0]), None, "walking", 3)
+    assert (text.start_s, text.end_s, text.up, text.forward) == (1.0, 2.0, (0.0, 0.0, 1.0), None)
+    assert (text.method, text.leans) == ("walking", 3)
+    assert replace(text, forward=(1.0, 0.0, 0.0)) == describe_period(
         1.0, 2.0, np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0]), "walking", 3
     )

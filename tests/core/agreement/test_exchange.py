@@ -1,4 +1,4 @@
-"""Labels by the joints: what is exchanged is named and put back; a right walk stays as it is."""
+"""Labels from the joints: swaps are named and corrected; correct walks are unchanged."""
 
 from __future__ import annotations
 
@@ -18,45 +18,45 @@ from tests.helpers.walks import only, simulated
 
 @cache
 def walk() -> UniformRecording:
-    made = simulated("comfortable", 1)[0]
-    return only(made, *(s for s in made.sensors if s != "chest"))
+    simulation = simulated("comfortable", 1)[0]
+    return only(simulation, *(s for s in simulation.sensors if s != "chest"))
 
 
 def wrong(swap: Swap) -> UniformRecording:
     return replace(walk(), sensors=undo_exchange(swap, walk().sensors))
 
 
-def pairs(found: Agreement) -> set[frozenset[str]]:
-    assert found.exchange is not None
-    return {frozenset(pair) for pair in found.exchange.swap}
+def pairs(result: Agreement) -> set[frozenset[str]]:
+    assert result.exchange is not None
+    return {frozenset(pair) for pair in result.exchange.swap}
 
 
 def test_a_right_walk_fits_best_as_it_is() -> None:
-    found = check_agreement(walk())
-    assert found.recording is walk()
-    assert found.exchange is not None
-    assert found.exchange.swap == ()
-    assert found.exchange.ratio < 0.9
-    assert found.exchange.cosine is not None
-    assert found.exchange.cosine > 0.9
+    agreement = check_agreement(walk())
+    assert agreement.recording is walk()
+    assert agreement.exchange is not None
+    assert agreement.exchange.swap == ()
+    assert agreement.exchange.ratio < 0.9
+    assert agreement.exchange.cosine is not None
+    assert agreement.exchange.cosine > 0.9
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("swap", [*SWAPS, LEGS, LEGS[1:]], ids=str)
 def test_exchanged_sensors_are_named_and_put_back(swap: Swap) -> None:
-    found = check_agreement(wrong(swap))
-    assert pairs(found) == {frozenset(pair) for pair in swap}
-    assert [n.code for n in found.recording.notices] == ["sensors_exchanged"]
-    for segment, signals in found.recording.sensors.items():
+    agreement = check_agreement(wrong(swap))
+    assert pairs(agreement) == {frozenset(pair) for pair in swap}
+    assert [n.code for n in agreement.recording.notices] == ["sensors_exchanged"]
+    for segment, signals in agreement.recording.sensors.items():
         assert signals is walk().sensors[segment]
 
 
 def test_exchanged_feet_are_told_and_left_where_so_configured() -> None:
     params = AgreementParams(exchange=ExchangeParams(repair=False))
-    found = check_agreement(wrong((("foot_l", "foot_r"),)), params)
-    assert pairs(found) == {frozenset(("foot_l", "foot_r"))}
-    assert found.recording.notices[0].code == "sensors_exchanged"
-    assert found.recording.sensors["foot_l"] is walk().sensors["foot_r"]
+    agreement = check_agreement(wrong((("foot_l", "foot_r"),)), params)
+    assert pairs(agreement) == {frozenset(("foot_l", "foot_r"))}
+    assert agreement.recording.notices[0].code == "sensors_exchanged"
+    assert agreement.recording.sensors["foot_l"] is walk().sensors["foot_r"]
 
 
 def test_exchanging_twice_changes_nothing() -> None:
@@ -65,19 +65,19 @@ def test_exchanging_twice_changes_nothing() -> None:
 
 
 def test_a_leg_whose_other_side_is_not_worn_moves_over() -> None:
-    worn = only(wrong(LEGS), "pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
-    found = check_agreement(worn)
-    assert [n.code for n in found.recording.notices] == ["sensors_exchanged"]
-    assert set(found.recording.sensors) == {"pelvis", "thigh_l", "thigh_r", "shank_l", "foot_l"}
-    assert found.recording.sensors["foot_l"] is walk().sensors["foot_l"]
+    segments = only(wrong(LEGS), "pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
+    agreement = check_agreement(segments)
+    assert [n.code for n in agreement.recording.notices] == ["sensors_exchanged"]
+    assert set(agreement.recording.sensors) == {"pelvis", "thigh_l", "thigh_r", "shank_l", "foot_l"}
+    assert agreement.recording.sensors["foot_l"] is walk().sensors["foot_l"]
 
 
 def test_without_a_pelvis_nobody_can_tell_legs_apart() -> None:
     legs = replace(walk(), sensors={s: x for s, x in wrong(LEGS).sensors.items() if s != "pelvis"})
-    found = check_agreement(legs)
-    assert found.exchange is not None
-    assert found.exchange.cosine is None
-    assert found.exchange.swap == ()
+    agreement = check_agreement(legs)
+    assert agreement.exchange is not None
+    assert agreement.exchange.cosine is None
+    assert agreement.exchange.swap == ()
 
 
 def test_people_who_stand_have_no_exchange() -> None:
@@ -85,26 +85,26 @@ def test_people_who_stand_have_no_exchange() -> None:
         s: replace(x, acc=np.tile(x.acc[:1], (len(x.acc), 1)), gyr=np.zeros_like(x.gyr))
         for s, x in walk().sensors.items()
     }
-    found = check_agreement(replace(walk(), sensors=stand))
-    assert found.recording.notices == ()
-    assert found.exchange is not None
-    assert found.exchange.swap == ()
+    agreement = check_agreement(replace(walk(), sensors=stand))
+    assert agreement.recording.notices == ()
+    assert agreement.exchange is not None
+    assert agreement.exchange.swap == ()
 
 
 def test_terms_are_kept_as_long_as_labels_are_judged_and_judge_the_same() -> None:
     params = AgreementParams()
     short = replace(params.exchange, over_s=8.0)
     joints, terms = compare_sensors(walk(), params.joints)
-    same, kept = compare_sensors(walk(), params.joints, over_s=8.0)
-    assert list(kept) == list(terms)
+    same, retained = compare_sensors(walk(), params.joints, over_s=8.0)
+    assert list(retained) == list(terms)
     for a, b in zip(joints, same, strict=True):
         np.testing.assert_array_equal(a.places, b.places)
     for s, x in terms.items():
         assert x.is_whole
-        assert not kept[s].is_whole
-        np.testing.assert_array_equal(kept[s].M, x.M[: len(kept[s].M)])
+        assert not retained[s].is_whole
+        np.testing.assert_array_equal(retained[s].M, x.M[: len(retained[s].M)])
     rate = walk().rate_hz
-    assert find_exchange(kept, same, rate, params.joints, short) == find_exchange(
+    assert find_exchange(retained, same, rate, params.joints, short) == find_exchange(
         terms, joints, rate, params.joints, short
     )
 
@@ -114,6 +114,8 @@ def test_exchanged_sensors_of_a_long_walk_are_compared_anew() -> None:
     """Longer than their labels are judged on, so that no terms of the whole are left."""
     swap: Swap = (("thigh_l", "thigh_r"),)
     params = AgreementParams(exchange=ExchangeParams(over_s=8.0))
-    found = check_agreement(wrong(swap), params)
-    assert pairs(found) == {frozenset(swap[0])}
-    assert found.misfits == check_agreement(wrong(swap)).misfits == check_agreement(walk(), params).misfits
+    agreement = check_agreement(wrong(swap), params)
+    assert pairs(agreement) == {frozenset(swap[0])}
+    assert (
+        agreement.misfits == check_agreement(wrong(swap)).misfits == check_agreement(walk(), params).misfits
+    )

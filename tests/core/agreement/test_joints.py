@@ -24,7 +24,7 @@ def test_joints_run_from_the_pelvis_down_on_one_side() -> None:
 
 def test_a_chain_of_one_clock_has_one_joint_to_the_rest() -> None:
     for chain in CHAINS:
-        across = [j for j in LEG_JOINTS if len(set(j) & set(chain)) == 1]
-        assert len(across) == 1
-        assert across[0][1] == chain[0]
+        lateral = [j for j in LEG_JOINTS if len(set(j) & set(chain)) == 1]
+        assert len(lateral) == 1
+        assert lateral[0][1] == chain[0]
     assert len(CHAINS) == 4

@@ -25,27 +25,27 @@ def rates(**changed: float) -> dict[Segment, float]:
 
 
 def sort(path: tuple[Segment, ...], turning: dict[Segment, float] | None = None) -> SortedLabels:
-    found = sort_by_joints(misfits_of(path), turning or rates(), 1.1)
-    assert found is not None
-    return found
+    result = sort_by_joints(misfits_of(path), turning or rates(), 1.1)
+    assert result is not None
+    return result
 
 
 def test_right_labels_are_the_best() -> None:
-    found = sort(PATH)
-    assert dict(found.stated_for) == {s: s for s in PATH}
-    assert found.misfit == pytest.approx(0.1)
-    assert found.stated == pytest.approx(0.1)
-    assert found.gain == pytest.approx(0.0)
-    assert found.next == pytest.approx(10 ** (-5 / 6)), "one of six neighbours no longer fits"
+    order = sort(PATH)
+    assert dict(order.stated_for) == {s: s for s in PATH}
+    assert order.misfit == pytest.approx(0.1)
+    assert order.stated == pytest.approx(0.1)
+    assert order.gain == pytest.approx(0.0)
+    assert order.next == pytest.approx(10 ** (-5 / 6)), "one of six neighbours no longer fits"
 
 
 def test_a_leg_put_on_upside_down_is_sorted() -> None:
-    found = sort(EXCHANGED_LEG)
-    assert dict(found.stated_for) == dict(zip(PATH, EXCHANGED_LEG, strict=True))
-    assert found.misfit == pytest.approx(0.1)
-    assert found.stated == pytest.approx(10 ** (-5 / 6))
-    assert found.gain == pytest.approx(log(10.0))
-    assert found.exchange_legs() == dict(zip(PATH, reversed(EXCHANGED_LEG), strict=True))
+    order = sort(EXCHANGED_LEG)
+    assert dict(order.stated_for) == dict(zip(PATH, EXCHANGED_LEG, strict=True))
+    assert order.misfit == pytest.approx(0.1)
+    assert order.stated == pytest.approx(10 ** (-5 / 6))
+    assert order.gain == pytest.approx(log(10.0))
+    assert order.exchange_legs() == dict(zip(PATH, reversed(EXCHANGED_LEG), strict=True))
 
 
 def test_the_end_with_more_of_the_left_leg_stays_the_left_one() -> None:
@@ -56,9 +56,9 @@ def test_the_end_with_more_of_the_left_leg_stays_the_left_one() -> None:
 
 def test_only_what_turns_least_can_be_the_pelvis() -> None:
     pelvis_is_thigh = (*PATH[:2], "pelvis", "thigh_l", *PATH[4:])
-    found = sort(pelvis_is_thigh)
-    assert found.stated_for["pelvis"] == "pelvis"
-    assert found.misfit > 0.1
+    order = sort(pelvis_is_thigh)
+    assert order.stated_for["pelvis"] == "pelvis"
+    assert order.misfit > 0.1
     assert sort(pelvis_is_thigh, rates(thigh_l=1.1)).stated_for["pelvis"] == "thigh_l"
     assert sort(pelvis_is_thigh, rates(thigh_l=1.2)).stated_for["pelvis"] == "pelvis"
 
@@ -72,7 +72,7 @@ def test_other_than_seven_sensors_are_not_sorted() -> None:
 
 
 def test_labels_are_clear_when_nothing_else_comes_near() -> None:
-    found = SortedLabels({}, misfit=0.5, stated=1.0, next=0.6)
-    assert found.is_clear(0.56, 1.1, 1.15)
-    assert not found.is_clear(0.54, 1.1, 1.15), "the likely exchange fits nearly as well"
-    assert not found.is_clear(0.56, 1.1, 1.25), "another order fits nearly as well"
+    result = SortedLabels({}, misfit=0.5, stated=1.0, next=0.6)
+    assert result.is_clear(0.56, 1.1, 1.15)
+    assert not result.is_clear(0.54, 1.1, 1.15), "the likely exchange fits nearly as well"
+    assert not result.is_clear(0.56, 1.1, 1.25), "another order fits nearly as well"

@@ -1,4 +1,4 @@
-"""The live comparison: what it tells, when it takes that back, and that blocks do not matter."""
+"""Live comparison: notices, withdrawals, independence of block sizes."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ NAMES = ("acc", "gyr", "valid")
 
 
 def walk() -> UniformRecording:
-    made = simulated("comfortable", 1)[0]
-    return only(made, *(s for s in made.sensors if s != "chest"))
+    simulation = simulated("comfortable", 1)[0]
+    return only(simulation, *(s for s in simulation.sensors if s != "chest"))
 
 
-def followed(one: UniformRecording, other: UniformRecording, at_s: float) -> UniformRecording:
+def followed(one: UniformRecording, second: UniformRecording, at_s: float) -> UniformRecording:
     """One take up to a moment, the other one from there on."""
     k = round(at_s * one.rate_hz)
 
@@ -37,7 +37,7 @@ def followed(one: UniformRecording, other: UniformRecording, at_s: float) -> Uni
         acc, gyr = (np.concatenate((x[:k], y[k:])) for x, y in ((a.acc, b.acc), (a.gyr, b.gyr)))
         return replace(a, acc=acc, gyr=gyr, mag=None)
 
-    return replace(one, sensors={s: joined(x, other.sensors[s]) for s, x in one.sensors.items()})
+    return replace(one, sensors={s: joined(x, second.sensors[s]) for s, x in one.sensors.items()})
 
 
 def first_sentence(notice: Notice) -> str:
@@ -52,16 +52,16 @@ def test_listening_begins_where_live_calibration_finds_the_standing() -> None:
 
 @pytest.mark.sweep
 def test_a_right_take_is_told_nothing_of() -> None:
-    watch, told = listen(walk(), STOOD)
-    assert told == []
+    watch, notices = listen(walk(), STOOD)
+    assert notices == []
     assert watch.doubts == {}
 
 
 @pytest.mark.sweep
 def test_a_late_sensor_is_told_once_in_the_words_of_a_file() -> None:
     late = delay_sensor(walk(), "shank_r", 0.040)
-    watch, told = listen(late, STOOD)
-    ((_, notice),) = told
+    watch, notices = listen(late, STOOD)
+    ((_, notice),) = notices
     (expected,) = check_agreement(late).recording.notices
     assert (notice.code, notice.sensor, notice.severity) == ("sensor_late", "shank_r", "warning")
     assert first_sentence(notice) == first_sentence(expected)
@@ -72,8 +72,8 @@ def test_a_late_sensor_is_told_once_in_the_words_of_a_file() -> None:
 @pytest.mark.parametrize("swap", [(("shank_l", "shank_r"),), LEGS])
 def test_exchanged_sensors_are_told_once_in_the_words_of_a_file(swap: Swap) -> None:
     wrong = replace(walk(), sensors=undo_exchange(swap, walk().sensors))
-    watch, told = listen(wrong, STOOD)
-    ((_, notice),) = told
+    watch, notices = listen(wrong, STOOD)
+    ((_, notice),) = notices
     (expected,) = check_agreement(wrong).recording.notices
     assert notice.code == "sensors_exchanged"
     assert first_sentence(notice) == first_sentence(expected)
@@ -82,10 +82,10 @@ def test_exchanged_sensors_are_told_once_in_the_words_of_a_file(swap: Swap) -> N
 
 def test_one_leg_on_the_other_side_is_told_of() -> None:
     wrong = replace(walk(), sensors=undo_exchange(LEGS, walk().sensors))
-    worn = only(wrong, "pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
-    _, told = listen(delay_sensor(worn, "shank_r", 0.06), STOOD)
+    segments = only(wrong, "pelvis", "thigh_l", "thigh_r", "shank_r", "foot_r")
+    _, notices = listen(delay_sensor(segments, "shank_r", 0.06), STOOD)
     # by the labels that fit
-    assert [(n.code, n.sensor) for _, n in told] == [
+    assert [(n.code, n.sensor) for _, n in notices] == [
         ("sensors_exchanged", "thigh_l"),
         ("sensor_late", "shank_l"),
     ]
@@ -93,8 +93,8 @@ def test_one_leg_on_the_other_side_is_told_of() -> None:
 
 def test_a_slip_is_told_with_its_moment() -> None:
     at_s = 17.0
-    watch, told = listen(slip_sensor(walk(), "thigh_l", np.radians(15.0), at_s), STOOD)
-    ((when, notice),) = told
+    watch, notices = listen(slip_sensor(walk(), "thigh_l", np.radians(15.0), at_s), STOOD)
+    ((when, notice),) = notices
     assert (notice.code, notice.sensor) == ("sensor_slipped", "thigh_l")
     assert notice.t_s == pytest.approx(at_s, abs=2.5)
     assert when < at_s + 12.0
@@ -103,9 +103,9 @@ def test_a_slip_is_told_with_its_moment() -> None:
 
 def test_a_clock_that_is_right_again_is_said_to_be() -> None:
     mended = followed(delay_sensor(walk(), "foot_l", 0.060), walk(), 22.0)
-    watch, told = listen(mended, STOOD)
-    assert [n.code for _, n in told] == ["sensor_late", "sensors_agree_again"]
-    assert [n.severity for _, n in told] == ["warning", "info"]
+    watch, notices = listen(mended, STOOD)
+    assert [n.code for _, n in notices] == ["sensor_late", "sensors_agree_again"]
+    assert [n.severity for _, n in notices] == ["warning", "info"]
     assert watch.doubts == {}
 
 
@@ -130,32 +130,32 @@ def test_a_sensor_that_never_sends_keeps_nobody_waiting() -> None:
     silent = replace(
         foot, acc=np.zeros_like(foot.acc), gyr=np.zeros_like(foot.gyr), valid=np.zeros_like(foot.valid)
     )
-    _, told = listen(replace(take, sensors={**take.sensors, "foot_l": silent}), STOOD)
-    assert [(n.code, n.sensor) for _, n in told] == [("sensor_late", "shank_r")]
+    _, notices = listen(replace(take, sensors={**take.sensors, "foot_l": silent}), STOOD)
+    assert [(n.code, n.sensor) for _, n in notices] == [("sensor_late", "shank_r")]
 
 
 def test_sensors_without_a_joint_are_not_compared() -> None:
     feet = only(walk(), "foot_l", "foot_r")
-    watch, told = listen(feet, STOOD)
-    assert told == []
+    watch, notices = listen(feet, STOOD)
+    assert notices == []
     assert watch.doubts == {}
 
 
 def test_terms_of_a_second_are_those_of_a_file() -> None:
     take, params = only(walk(), "shank_l", "foot_l"), JointParams()
     whole = [find_terms(x, take.rate_hz, params).M for x in take.sensors.values()]
-    worn = list(take.sensors.values())
+    segments = list(take.sensors.values())
     seconds = [
-        RawSecond(*(np.stack([getattr(x, name)[k : k + 100] for x in worn], axis=1) for name in NAMES))
+        RawSecond(*(np.stack([getattr(x, name)[k : k + 100] for x in segments], axis=1) for name in NAMES))
         for k in range(0, 3000, 100)
     ]
     live = LiveTerms(seconds[0], take.rate_hz, params)
     for second in seconds[1:]:
-        found = live.push(second)
-        if found is None or found.start < 900:
+        frame = live.push(second)
+        if frame is None or frame.start < 900:
             continue
-        start = (100 + found.start) // 2
-        for M, expected in zip(found.M, whole, strict=True):
+        start = (100 + frame.start) // 2
+        for M, expected in zip(frame.M, whole, strict=True):
             part = expected[start - 8 : start + 58]
             assert M.shape == part.shape
             # the heading of the level frames is free, and where they began differs

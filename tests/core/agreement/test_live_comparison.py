@@ -1,4 +1,4 @@
-"""Sensors compared from one standing on: when labels are settled, and what is said by the labels that fit."""
+"""Sensor comparison from a standing on: settled labels, and notices by fitting labels."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ def ankle() -> UniformRecording:
 
 def seconds(take: UniformRecording, from_s: float) -> Iterator[RawSecond]:
     rate = round(take.rate_hz)
-    worn = list(take.sensors.values())
+    segments = list(take.sensors.values())
     for k in range(round(from_s * rate), len(take.t_s) - rate + 1, rate):
         acc, gyr, valid = (
-            np.stack([x[k : k + rate] for x in given], axis=1)
-            for given in zip(*((s.acc, s.gyr, s.valid) for s in worn), strict=True)
+            np.stack([x[k : k + rate] for x in inputs], axis=1)
+            for inputs in zip(*((s.acc, s.gyr, s.valid) for s in segments), strict=True)
         )
         yield RawSecond(acc, gyr, valid)
 
 
 def compare(take: UniformRecording) -> list[Verdict]:
-    """What is said from the standing on."""
+    """Notices from the standing on."""
     standing, *later = seconds(take, FIRST_S - 1.0)
     rate = take.rate_hz
-    found = SensorComparison(
+    sensor_comparison = SensorComparison(
         tuple(take.sensors), standing, round(FIRST_S * rate), rate, round(rate / 50.0), LiveAgreementParams()
     )
-    said = (found.push(x) for x in later)
-    return [x for x in said if x is not None]
+    frames = (sensor_comparison.push(x) for x in later)
+    return [x for x in frames if x is not None]
 
 
 def test_right_sensors_are_settled_after_some_windows_of_walking_and_nothing_is_told() -> None:
@@ -68,7 +68,7 @@ def test_a_late_foot_is_said_by_its_ankle_alone() -> None:
 def test_people_who_stand_are_told_nothing() -> None:
     take = ankle()
     standing = next(seconds(take, FIRST_S - 1.0))
-    found = SensorComparison(
+    sensor_comparison = SensorComparison(
         tuple(take.sensors), standing, 0, take.rate_hz, round(take.rate_hz / 50.0), LiveAgreementParams()
     )
-    assert [found.push(standing) for _ in range(12)] == [None] * 12
+    assert [sensor_comparison.push(standing) for _ in range(12)] == [None] * 12

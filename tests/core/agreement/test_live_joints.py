@@ -22,7 +22,7 @@ AROUND = round(PARAMS.widest_s * RATE_HZ)
 
 
 def seconds(count: int) -> Iterable[TermSecond]:
-    """Thigh and shank, each second with what lies around it."""
+    """Thigh and shank, each second with its context."""
     terms = make_terms(count + 1)
     M = np.stack([terms["thigh_l"].M, terms["shank_l"].M])
     usable = np.ones(M.shape[:2], np.bool_)
@@ -40,16 +40,16 @@ def knee() -> LivePair:
 
 def test_a_window_is_said_once_it_is_full_and_the_joint_is_where_it_is() -> None:
     pair = knee()
-    said = [pair.push(x, (0, 1), 10.0 + k) for k, x in enumerate(seconds(8))]
-    assert said == [False] * 5 + [True] * 3
+    frames = [pair.push(x, (0, 1), 10.0 + k) for k, x in enumerate(seconds(8))]
+    assert frames == [False] * 5 + [True] * 3
     assert len(pair) == 3
-    found = pair.read()
-    assert (found.first, found.second) == ("thigh_l", "shank_l")
-    assert found.t_s.tolist() == [15.0, 16.0, 17.0]
-    assert found.lag_s == pytest.approx(0.0, abs=1e-3)
-    assert found.residual.max() < 0.05
-    assert found.places == pytest.approx(np.tile(np.concatenate(KNEE), (3, 1)), abs=0.01)
-    assert (found.width_s, found.step_s) == (6.0, 1.0)
+    content = pair.read()
+    assert (content.first, content.second) == ("thigh_l", "shank_l")
+    assert content.t_s.tolist() == [15.0, 16.0, 17.0]
+    assert content.lag_s == pytest.approx(0.0, abs=1e-3)
+    assert content.residual.max() < 0.05
+    assert content.places == pytest.approx(np.tile(np.concatenate(KNEE), (3, 1)), abs=0.01)
+    assert (content.width_s, content.step_s) == (6.0, 1.0)
     swing = pair.read_swing()
     assert swing["thigh_l"].tolist() == [3.5, 4.5, 5.5]
     assert swing["shank_l"].tolist() == [2.0] * 3
@@ -57,12 +57,12 @@ def test_a_window_is_said_once_it_is_full_and_the_joint_is_where_it_is() -> None
 
 def test_a_lost_second_says_nothing_and_is_forgotten_again() -> None:
     pair = knee()
-    given = list(seconds(14))
+    items = list(seconds(14))
     for k in (2, 5):
-        given[k].usable[0] = False
-    said = [pair.push(x, (0, 1), float(k)) for k, x in enumerate(given)]
+        items[k].usable[0] = False
+    frames = [pair.push(x, (0, 1), float(k)) for k, x in enumerate(items)]
     # five of six seconds are enough
-    assert said == [False] * 8 + [True] * 6
+    assert frames == [False] * 8 + [True] * 6
 
 
 def test_only_the_last_windows_are_kept() -> None:
@@ -91,19 +91,19 @@ def windows(first: Segment, second: Segment) -> JointWindows:
 
 def test_windows_get_the_labels_that_fit() -> None:
     swap: Swap = (("shank_l", "foot_l"),)
-    given = [windows("thigh_l", "foot_l"), windows("shank_l", "foot_l"), windows("thigh_r", "shank_r")]
-    found = relabel(swap, {frozenset((w.first, w.second)): w for w in given})
-    assert set(found) == {("thigh_l", "shank_l"), ("shank_l", "foot_l"), ("thigh_r", "shank_r")}
-    knee = found["thigh_l", "shank_l"]
+    inputs = [windows("thigh_l", "foot_l"), windows("shank_l", "foot_l"), windows("thigh_r", "shank_r")]
+    result = relabel(swap, {frozenset((w.first, w.second)): w for w in inputs})
+    assert set(result) == {("thigh_l", "shank_l"), ("shank_l", "foot_l"), ("thigh_r", "shank_r")}
+    knee = result["thigh_l", "shank_l"]
     assert (knee.first, knee.second, knee.lag_s[0]) == ("thigh_l", "shank_l", 0.02)
-    ankle = found["shank_l", "foot_l"]
+    ankle = result["shank_l", "foot_l"]
     assert (ankle.first, ankle.second, ankle.lag_s[0], ankle.turn[0]) == ("shank_l", "foot_l", -0.02, -0.1)
     assert ankle.places[0].tolist() == [3.0, 4.0, 5.0, 0.0, 1.0, 2.0]
-    right = found["thigh_r", "shank_r"]
-    assert vars(right) == vars(replace(given[2]))
+    right = result["thigh_r", "shank_r"]
+    assert vars(right) == vars(replace(inputs[2]))
 
 
 def test_a_pair_that_was_not_compared_is_left_out() -> None:
-    given = windows("thigh_l", "shank_l")
-    assert relabel((), {frozenset(("thigh_l", "foot_l")): given}) == {}
-    assert list(relabel((), {frozenset(("thigh_l", "shank_l")): given})) == [("thigh_l", "shank_l")]
+    inputs = windows("thigh_l", "shank_l")
+    assert relabel((), {frozenset(("thigh_l", "foot_l")): inputs}) == {}
+    assert list(relabel((), {frozenset(("thigh_l", "shank_l")): inputs})) == [("thigh_l", "shank_l")]

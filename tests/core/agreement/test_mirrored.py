@@ -52,8 +52,8 @@ def test_nobody_is_mirrored_where_the_joints_fit() -> None:
 
 @pytest.mark.parametrize("segment", ["thigh_l", "shank_l", "foot_l"])
 def test_the_sensor_with_wrong_signs_is_found_by_its_joints(segment: Segment) -> None:
-    found, gain = find(mirror(segment))
-    assert found == {segment}
+    matches, gain = find(mirror(segment))
+    assert matches == {segment}
     joints = 2 if segment == "shank_l" else 1
     assert gain > joints * 2.0
     assert find(mirror(segment), least=float(np.exp(gain + 0.1))) == (frozenset(), 0.0)
@@ -64,8 +64,8 @@ def test_a_joint_that_fits_badly_either_way_says_nothing() -> None:
     rng = np.random.default_rng(5)
     strange = replace(terms["foot_l"], M=4.0 * rng.standard_normal(terms["foot_l"].M.shape))
     misfits = {frozenset(j): 3.0 for j in JOINTS}
-    given = {**terms, "foot_l": strange}
-    assert find_mirrored(given, misfits, JOINTS[1:], PARAMS, ExchangeParams()) == (frozenset(), 0.0)
+    inputs = {**terms, "foot_l": strange}
+    assert find_mirrored(inputs, misfits, JOINTS[1:], PARAMS, ExchangeParams()) == (frozenset(), 0.0)
 
 
 def test_what_was_never_compared_gains_nothing() -> None:

@@ -24,26 +24,26 @@ AT_S = 17.0
 
 
 def walk() -> UniformRecording:
-    made = simulated("comfortable", 1)[0]
-    return only(made, *(s for s in made.sensors if s != "chest"))
+    simulation = simulated("comfortable", 1)[0]
+    return only(simulation, *(s for s in simulation.sensors if s != "chest"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("segment", ["shank_r", "foot_l"])
 def test_a_slip_is_named_with_its_moment_and_angle(segment: Segment) -> None:
     slipped = slip_sensor(walk(), segment, np.radians(15.0), AT_S)
-    found = check_agreement(slipped)
-    assert [x.segment for x in found.slips] == [segment]
-    slip = found.slips[0]
+    agreement = check_agreement(slipped)
+    assert [x.segment for x in agreement.slips] == [segment]
+    slip = agreement.slips[0]
     assert abs(slip.turn_rad) == pytest.approx(np.radians(15.0), abs=np.radians(2.0))
     assert slip.at_s == pytest.approx(AT_S, abs=2.5)
-    assert [n.code for n in found.recording.notices] == ["sensor_slipped"]
-    start, end = found.doubtful[segment]
+    assert [n.code for n in agreement.recording.notices] == ["sensor_slipped"]
+    start, end = agreement.doubtful[segment]
     assert start < AT_S < end
     assert (end == np.inf) == (segment == "foot_l")
-    lost = ~found.recording.sensors[segment].valid
+    lost = ~agreement.recording.sensors[segment].valid
     assert np.array_equal(lost, (slipped.t_s >= start) & (segment == "foot_l"))
-    assert (found.whole is None) == (segment == "shank_r")
+    assert (agreement.whole is None) == (segment == "shank_r")
 
 
 @pytest.mark.slow
@@ -80,15 +80,15 @@ def test_what_the_gyroscope_saw_of_a_slip_leaves_its_rate() -> None:
 @pytest.mark.sweep
 @pytest.mark.parametrize(("segment", "by_deg"), [("thigh_l", 15.0), ("foot_l", 15.0), ("foot_l", -15.0)])
 def test_no_figure_rests_on_what_a_slipped_sensor_measured(segment: Segment, by_deg: float) -> None:
-    """Whatever is still told is what the same walk gives without the slip, within what is stated."""
+    """Parameters reported despite a slip equal those without it, within their uncertainty."""
     right = analysed("healthy", 5)
     slipped = slip_sensor(right.recording, segment, np.radians(by_deg), find_middle(right.recording))
-    found = resume(replace(right, uniform=slipped), "agreement")
-    assert [n.code for n in found.notices if n.code in ("sensor_slipped", "gap")] == ["sensor_slipped"]
+    resumed_run = resume(replace(right, uniform=slipped), "agreement")
+    assert [n.code for n in resumed_run.notices if n.code in ("sensor_slipped", "gap")] == ["sensor_slipped"]
     truth = {(p.name, p.side): p.mean for p in right.parameters}
     wrong = [
         (p.name, p.side, truth[p.name, p.side], p.mean)
-        for p in found.parameters
+        for p in resumed_run.parameters
         if p.mean is not None
         and p.uncertainty is not None
         and (mean := truth[p.name, p.side]) is not None
@@ -98,8 +98,8 @@ def test_no_figure_rests_on_what_a_slipped_sensor_measured(segment: Segment, by_
 
 
 def test_a_turn_that_comes_back_is_no_slip() -> None:
-    there = slip_sensor(walk(), "shank_r", np.radians(15.0), 14.0)
-    assert check_agreement(slip_sensor(there, "shank_r", -np.radians(15.0), 19.0)).slips == ()
+    target = slip_sensor(walk(), "shank_r", np.radians(15.0), 14.0)
+    assert check_agreement(slip_sensor(target, "shank_r", -np.radians(15.0), 19.0)).slips == ()
 
 
 def test_the_main_axis_of_a_leg_is_what_it_turns_about() -> None:
@@ -120,8 +120,8 @@ def test_angles_beside_a_slipped_sensor_are_withheld_from_there_on() -> None:
         diagnostics={},
         notices=(),
     )
-    shown = withhold_at_slips(angles, {"shank_l": (4.0, np.inf), "thigh_r": (2.0, 3.0)}).angles
-    assert np.isfinite(shown["hip_flexion_l"]).all()
+    visible_angles = withhold_at_slips(angles, {"shank_l": (4.0, np.inf), "thigh_r": (2.0, 3.0)}).angles
+    assert np.isfinite(visible_angles["hip_flexion_l"]).all()
     for name in ("knee_flexion_l", "ankle_dorsiflexion_l"):
-        assert np.array_equal(np.isnan(shown[name]), t_s >= 4.0)
-    assert np.array_equal(np.isnan(shown["knee_flexion_r"]), (t_s >= 2.0) & (t_s <= 3.0))
+        assert np.array_equal(np.isnan(visible_angles[name]), t_s >= 4.0)
+    assert np.array_equal(np.isnan(visible_angles["knee_flexion_r"]), (t_s >= 2.0) & (t_s <= 3.0))

@@ -1,4 +1,4 @@
-"""Words about sensors that disagree: numbers, signs, and what was done."""
+"""Texts of inconsistent sensors: numbers, signs, actions."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def test_a_lag_is_said_in_milliseconds_with_its_direction() -> None:
 
 
 def test_what_was_done_about_a_lag_is_said() -> None:
-    told = tell_lag(LATE, LagParams())
-    assert (told.code, told.sensor, told.severity) == ("sensor_late", "shank_r", "warning")
-    assert "its samples were shifted by that. Synchronise" in told.message
+    text = tell_lag(LATE, LagParams())
+    assert (text.code, text.sensor, text.severity) == ("sensor_late", "shank_r", "warning")
+    assert "its samples were shifted by that. Synchronise" in text.message
     little = tell_lag(replace(LATE, lag_s=-0.025), LagParams(warn_s=0.025))
     assert little.severity == "info"
     assert "Synchronise" not in little.message
@@ -51,23 +51,23 @@ def test_what_was_done_about_a_lag_is_said() -> None:
 @pytest.mark.parametrize(("change_s", "which"), [(0.030, "slow"), (-0.030, "fast")])
 def test_a_drift_has_a_direction(change_s: float, which: str) -> None:
     drift = SensorDrift("foot_l", change_s, 0.004, 10.0, 70.0)
-    told = tell_drift(drift, LagParams())
-    assert (told.code, told.sensor) == ("clock_drifts", "foot_l")
-    assert told.message.startswith(
+    text = tell_drift(drift, LagParams())
+    assert (text.code, text.sensor) == ("clock_drifts", "foot_l")
+    assert text.message.startswith(
         f"The clock of foot_l runs {which}, by 30 ± 4 ms over the walk; its samples"
     )
     assert "it was left so" in tell_drift(drift, LagParams(repair=False)).message
 
 
 def test_an_exchange_names_its_pairs() -> None:
-    found = SensorExchange((("thigh_l", "thigh_r"), ("foot_l", "foot_r")), 1.5, None)
-    assert say_exchange(found) == (
+    sensor_exchange = SensorExchange((("thigh_l", "thigh_r"), ("foot_l", "foot_r")), 1.5, None)
+    assert say_exchange(sensor_exchange) == (
         "Joint motion shows that sensors are swapped: thigh_l with thigh_r and foot_l with foot_r."
     )
-    told = tell_exchange(found, ExchangeParams())
-    assert (told.code, told.sensor) == ("sensors_exchanged", "thigh_l")
-    assert "the right way round" in told.message
-    assert "Nothing was changed" in tell_exchange(found, ExchangeParams(repair=False)).message
+    text = tell_exchange(sensor_exchange, ExchangeParams())
+    assert (text.code, text.sensor) == ("sensors_exchanged", "thigh_l")
+    assert "the right way round" in text.message
+    assert "Nothing was changed" in tell_exchange(sensor_exchange, ExchangeParams(repair=False)).message
 
 
 def test_a_slip_is_said_in_degrees_with_its_moment() -> None:
@@ -87,9 +87,9 @@ def test_what_follows_from_a_slip_is_said() -> None:
 
 
 def test_what_is_left_after_the_repair_is_doubtful() -> None:
-    told = tell_left_over(replace(LATE, lag_s=-0.0404))
-    assert (told.code, told.sensor) == ("clocks_disagree", "shank_r")
-    assert "After the repair shank_r and foot_r still seems 40 ms off" in told.message
+    text = tell_left_over(replace(LATE, lag_s=-0.0404))
+    assert (text.code, text.sensor) == ("clocks_disagree", "shank_r")
+    assert "After the repair shank_r and foot_r still seems 40 ms off" in text.message
 
 
 def test_sensors_are_listed_as_in_a_sentence() -> None:

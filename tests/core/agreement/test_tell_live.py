@@ -33,22 +33,22 @@ def test_a_lag_is_told_with_its_moment(
     lag_s: float, sure: bool, code: str, severity: str, advice: bool
 ) -> None:
     lag = replace(LATE, lag_s=lag_s, sure=sure)
-    told = tell_lag_now(lag, LagParams(warn_s=0.025), 31.5)
-    assert (told.code, told.sensor, told.t_s, told.severity) == (code, "shank_r", 31.5, severity)
-    assert told.message.startswith(f"{say_lag(lag)}. ")
-    assert ("Synchronise the sensors" in told.message) == advice
-    assert "shifted" not in told.message
+    text = tell_lag_now(lag, LagParams(warn_s=0.025), 31.5)
+    assert (text.code, text.sensor, text.t_s, text.severity) == (code, "shank_r", 31.5, severity)
+    assert text.message.startswith(f"{say_lag(lag)}. ")
+    assert ("Synchronise the sensors" in text.message) == advice
+    assert "shifted" not in text.message
 
 
 def test_an_exchange_and_a_slip_ask_for_another_calibration() -> None:
-    found = SensorExchange((("shank_l", "shank_r"),), 1.4, 0.9)
-    told = tell_exchange_now(found, 12.0)
-    assert (told.code, told.sensor, told.t_s) == ("sensors_exchanged", "shank_l", 12.0)
-    assert told.message.startswith(say_exchange(found))
+    sensor_exchange = SensorExchange((("shank_l", "shank_r"),), 1.4, 0.9)
+    text = tell_exchange_now(sensor_exchange, 12.0)
+    assert (text.code, text.sensor, text.t_s) == ("sensors_exchanged", "shank_l", 12.0)
+    assert text.message.startswith(say_exchange(sensor_exchange))
     slipped = tell_slip_now(SLIP)
     assert (slipped.code, slipped.sensor, slipped.t_s) == ("sensor_slipped", "thigh_l", SLIP.at_s)
     assert slipped.message.startswith(say_slip(SLIP))
-    for message in (told.message, slipped.message):
+    for message in (text.message, slipped.message):
         assert message.endswith("calibrate again.")
 
 
@@ -62,5 +62,5 @@ def test_an_exchange_and_a_slip_ask_for_another_calibration() -> None:
     ],
 )
 def test_what_was_told_is_taken_back_in_its_own_words(code: str, says: str) -> None:
-    told = take_back(Notice(code, "…", "foot_l", 3.0), ("foot_l", "foot_r"), 9.0)
-    assert told == Notice(AGAIN, says, "foot_l", 9.0, "info")
+    notices = take_back(Notice(code, "…", "foot_l", 3.0), ("foot_l", "foot_r"), 9.0)
+    assert notices == Notice(AGAIN, says, "foot_l", 9.0, "info")

@@ -1,4 +1,4 @@
-"""The compiled angles: those of the readable decomposition, between what is worn, whatever the blocks."""
+"""Compiled angles equal the readable decomposition, for all sensor sets and block sizes."""
 
 from __future__ import annotations
 
@@ -22,37 +22,39 @@ def turned(n: int) -> tuple[Floats, Bools]:
 
 
 def test_compiled_angles_are_those_of_the_decomposition() -> None:
-    q, known = turned(400)
+    q, known_rotation = turned(400)
     kernel = AngleKernel.between(SEGMENTS)
     zero = np.linspace(-1.0, 1.0, len(kernel.names))
-    found = dict(zip(kernel.names, kernel.measure(q, known, zero).T, strict=True))
+    mapping = dict(zip(kernel.names, kernel.measure(q, known_rotation, zero).T, strict=True))
     column = {s: i for i, s in enumerate(SEGMENTS)}
     expected: dict[str, Floats] = {}
-    here = known[:, column["pelvis"]]
+    place = known_rotation[:, column["pelvis"]]
     for name, value in zip(
         ("pelvis_tilt", "pelvis_obliquity"), pelvis_angles(q[:, column["pelvis"]]), strict=True
     ):
-        expected[name] = np.where(here, value, np.nan)
+        expected[name] = np.where(place, value, np.nan)
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
             i, j = column[proximal], column[distal]
             abc = cardan_zxy(multiply(conjugate(q[:, i]), q[:, j]))
             for (base, right, left), value in zip(SIGNS[joint], abc.T, strict=True):
                 sign = right if side == "right" else left
-                expected[f"{base}_{SUFFIX[side]}"] = np.where(known[:, i] & known[:, j], sign * value, np.nan)
+                expected[f"{base}_{SUFFIX[side]}"] = np.where(
+                    known_rotation[:, i] & known_rotation[:, j], sign * value, np.nan
+                )
     assert tuple(expected) == kernel.names
     for name, offset in zip(kernel.names, zero, strict=True):
-        off = subtract_zero(found[name] - expected[name], -offset)
+        off = subtract_zero(mapping[name] - expected[name], -offset)
         np.testing.assert_allclose(off[np.isfinite(off)], 0.0, atol=1e-12)
-        assert np.array_equal(np.isnan(found[name]), np.isnan(expected[name]))
+        assert np.array_equal(np.isnan(mapping[name]), np.isnan(expected[name]))
 
 
 def test_any_division_into_blocks_gives_the_same_bits() -> None:
-    q, known = turned(300)
+    q, known_rotation = turned(300)
     kernel = AngleKernel.between(SEGMENTS)
-    whole = kernel.measure(q, known)
+    whole = kernel.measure(q, known_rotation)
     for step in (1, 7, 100):
-        parts = [kernel.measure(q[k : k + step], known[k : k + step]) for k in range(0, 300, step)]
+        parts = [kernel.measure(q[k : k + step], known_rotation[k : k + step]) for k in range(0, 300, step)]
         np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
@@ -65,14 +67,14 @@ def test_angles_are_those_between_worn_neighbours(worn: tuple[str, ...]) -> None
 
 
 def test_a_joint_that_lacks_a_sensor_is_taken_from_the_figure_with_both_ends() -> None:
-    q, known = turned(50)
-    worn = PRESETS["feet_pelvis3"]
-    kernel = AngleKernel.between(worn, SEGMENTS)
-    sensors = np.array([SEGMENTS.index(s) for s in worn])
-    other = q[::-1]
-    both = np.concatenate((other[:, sensors], q), axis=1)
-    found = kernel.measure(both, np.concatenate((known[:, sensors], known), axis=1))
-    alone, figure = AngleKernel.between(("pelvis",)), AngleKernel.between(SEGMENTS)
-    np.testing.assert_array_equal(found[:, :2], alone.measure(other[:, :1], known[:, :1]))
-    np.testing.assert_array_equal(found[:, 2:], figure.measure(q, known)[:, 2:])
+    q, known_rotation = turned(50)
+    segments = PRESETS["feet_pelvis3"]
+    kernel = AngleKernel.between(segments, SEGMENTS)
+    sensors = np.array([SEGMENTS.index(s) for s in segments])
+    second = q[::-1]
+    pair = np.concatenate((second[:, sensors], q), axis=1)
+    measurement = kernel.measure(pair, np.concatenate((known_rotation[:, sensors], known_rotation), axis=1))
+    single, figure = AngleKernel.between(("pelvis",)), AngleKernel.between(SEGMENTS)
+    np.testing.assert_array_equal(measurement[:, :2], single.measure(second[:, :1], known_rotation[:, :1]))
+    np.testing.assert_array_equal(measurement[:, 2:], figure.measure(q, known_rotation)[:, 2:])
     assert kernel.estimated == (False, False, *([True] * (len(kernel.names) - 2)))

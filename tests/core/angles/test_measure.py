@@ -122,8 +122,8 @@ def test_a_lost_segment_is_no_number_in_its_joints_only() -> None:
 
 def test_a_joint_without_both_segments_is_left_out_with_a_reason() -> None:
     orientations = pose()
-    worn: tuple[Segment, ...] = ("thigh_l", "shank_l")
-    q = {s: orientations.q[s] for s in worn}
+    segment_names: tuple[Segment, ...] = ("thigh_l", "shank_l")
+    q = {s: orientations.q[s] for s in segment_names}
     angles = measure_angles(Orientations(orientations.t_s, 100.0, q, orientations.valid, "test"), (0.0, 1.0))
     assert set(angles.angles) == {"knee_flexion_l", "knee_adduction_l", "knee_rotation_l"}
     assert {n.code for n in angles.notices} == {"joint_missing"}
@@ -178,5 +178,5 @@ def test_headings_are_continuous_over_turns_and_only_of_sensors() -> None:
     course = compute_headings(Orientations(np.arange(n) / 100.0, 100.0, {"pelvis": q}, valid, "test"))
     assert set(course) == {"pelvis"}
     assert np.isnan(course["pelvis"][50:60]).all()
-    known = np.isfinite(course["pelvis"])
-    np.testing.assert_allclose((course["pelvis"] - turning)[known], course["pelvis"][0], atol=1e-9)
+    known_finite = np.isfinite(course["pelvis"])
+    np.testing.assert_allclose((course["pelvis"] - turning)[known_finite], course["pelvis"][0], atol=1e-9)

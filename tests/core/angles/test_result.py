@@ -1,4 +1,4 @@
-"""Joints of a leg, signs of their angles, and which angles nobody measures."""
+"""Joints of a leg, signs of their angles, and unmeasured angles."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def test_joints_of_a_leg_are_linked_from_the_pelvis_to_the_foot() -> None:
 
 
 def test_only_what_lies_in_the_sagittal_plane_has_one_sign_on_both_sides() -> None:
-    for joint, ((_, right, left), *across) in SIGNS.items():
+    for joint, ((_, right, left), *lateral) in SIGNS.items():
         assert right == left == (-1 if joint == "knee" else 1)
-        assert [(r, l) for _, r, l in across] == [(1, -1), (1, -1)]  # noqa: E741
+        assert [(r, l) for _, r, l in lateral] == [(1, -1), (1, -1)]  # noqa: E741
     assert len({name for names in SIGNS.values() for name, _, _ in names}) == 9
 
 

@@ -71,16 +71,16 @@ def feet_alone() -> TakeAnalysis:
     return analyse(worn(simulate_scenario("comfortable", 0).recording, None, "foot_l", "foot_r"))
 
 
-def at_the_bound(found: TakeAnalysis) -> TakeAnalysis:
+def at_the_bound(result: TakeAnalysis) -> TakeAnalysis:
     """The same with legs too short for the way their feet go: knees rest at their bound through stance."""
-    assert found.angles is not None
-    assert found.tracks is not None
-    ends = {name: bound + np.radians(12.0) for name, bound in found.angles.bounds.items()}
+    assert result.angles is not None
+    assert result.tracks is not None
+    ends = {name: bound + np.radians(12.0) for name, bound in result.angles.bounds.items()}
     assert len(ends) == 2
-    held = {name: np.maximum(found.angles.angles[name], end) for name, end in ends.items()}
-    angles = replace(found.angles, angles={**found.angles.angles, **held}, bounds=ends)
-    tracks = replace(found.tracks, angles=angles)
-    return replace(found, angles=angles, tracks=tracks, measured=measure_gait(tracks))
+    held = {name: np.maximum(result.angles.angles[name], end) for name, end in ends.items()}
+    angles = replace(result.angles, angles={**result.angles.angles, **held}, bounds=ends)
+    tracks = replace(result.tracks, angles=angles)
+    return replace(result, angles=angles, tracks=tracks, measured=measure_gait(tracks))
 
 
 @pytest.mark.slow
@@ -93,10 +93,10 @@ def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
     assert find_shown_level("good", "bad") == "poor"
     assert find_shown_level("good", "warn") == "usable"
     assert find_shown_level("poor", "good") == "poor"
-    found = exchanged()
-    assert found.poses is not None
-    assert (found.quality.level, find_worst_verdict(found.poses.health)) == ("usable", "bad")
-    files = analysis_files(found)
+    exchange = exchanged()
+    assert exchange.poses is not None
+    assert (exchange.quality.level, find_worst_verdict(exchange.poses.health)) == ("usable", "bad")
+    files = analysis_files(exchange)
     quality = json.loads(files["analysis.json"])["quality"]
     assert (quality["level"], quality["signals_level"]) == ("poor", "usable")
     assert "sensors contradict" in quality["reasons"][-1]
@@ -106,8 +106,8 @@ def test_the_level_people_see_is_the_worst_of_signals_and_estimator() -> None:
 
 @pytest.mark.slow
 def test_angles_of_a_joint_whose_estimator_is_bad_are_withheld_with_the_reason() -> None:
-    found = exchanged()
-    assert found.angles is not None
+    exchange = exchanged()
+    assert exchange.angles is not None
     hips_and_knees = {
         f"{joint}_{motion}_{side}"
         for joint, motions in (("hip", ("flexion", "adduction", "rotation")),
@@ -115,33 +115,33 @@ def test_angles_of_a_joint_whose_estimator_is_bad_are_withheld_with_the_reason()
         for motion in motions
         for side in "lr"
     }  # fmt: skip
-    assert found.angles.withheld == dict.fromkeys(found.angles.withheld, "estimator_bad")
-    assert set(found.angles.withheld) >= hips_and_knees
-    assert not set(found.angles.withheld) & set(found.angles.angles)
-    assert "angles_withheld" in [n.code for n in found.notices]
-    knees = [p for p in found.parameters if p.name.startswith(("knee_", "hip_"))]
+    assert exchange.angles.withheld == dict.fromkeys(exchange.angles.withheld, "estimator_bad")
+    assert set(exchange.angles.withheld) >= hips_and_knees
+    assert not set(exchange.angles.withheld) & set(exchange.angles.angles)
+    assert "angles_withheld" in [n.code for n in exchange.notices]
+    knees = [p for p in exchange.parameters if p.name.startswith(("knee_", "hip_"))]
     assert len(knees) >= 16
     assert all((p.mean, p.sd, p.reason) == (None, None, "estimator_bad") for p in knees)
     # times are of the feet and stay
-    assert all(p.mean is not None for p in found.parameters if p.name == "stride_time_s")
+    assert all(p.mean is not None for p in exchange.parameters if p.name == "stride_time_s")
 
 
 @pytest.mark.slow
 def test_what_was_withheld_stays_so_in_files_pages_and_after_an_edit() -> None:
-    found = exchanged()
-    files = analysis_files(found)
+    exchange = exchanged()
+    files = analysis_files(exchange)
     bundle = load_bundle(files)
-    assert found.angles is not None
+    assert exchange.angles is not None
     assert bundle.angles is not None
-    assert bundle.angles.withheld == found.angles.withheld
+    assert bundle.angles.withheld == exchange.angles.withheld
     header = files["strides.csv"].decode().splitlines()[0].split(",")
     rows = [line.split(",") for line in files["strides.csv"].decode().splitlines()[1:]]
     for name in list_curve_figures():
         if name.startswith(("knee_", "hip_")) and name in header:
             assert not any(row[header.index(name)] for row in rows), name
-    again = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
-    known = {(p.name, p.side): p.reason for p in found.parameters}
-    assert {(p.name, p.side): p.reason for p in again.parameters} == known
+    second_gait = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
+    reference = {(p.name, p.side): p.reason for p in exchange.parameters}
+    assert {(p.name, p.side): p.reason for p in second_gait.parameters} == reference
     curves = cycle_curves(bundle.angles, bundle.strides)
     panels = {p.variable.name: p for p in curve_panels(bundle, curves, NOBODY)}
     assert panels["knee_flexion"].reason == REASONS["estimator_bad"]
@@ -152,64 +152,64 @@ DISTANCES = ("gait_speed_mps", "total_distance_m", *NAMES[1:])
 
 @pytest.mark.slow
 def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_and_after_an_edit() -> None:
-    found = exchanged()
-    distances = [p for p in found.parameters if p.name in DISTANCES]
+    exchange = exchanged()
+    distances = [p for p in exchange.parameters if p.name in DISTANCES]
     assert len(distances) == 2 + 2 * len(NAMES[1:])
     assert {(p.mean, p.reason) for p in distances} == {(None, "estimator_bad")}
-    told = [n.message for n in found.notices if n.code == "distances_withheld"]
-    assert len(told) == 1
-    assert told[0].startswith("Distances of both feet are withheld: the path does not fit the sensors.")
-    files = analysis_files(found)
+    messages = [n.message for n in exchange.notices if n.code == "distances_withheld"]
+    assert len(messages) == 1
+    assert messages[0].startswith("Distances of both feet are withheld: the path does not fit the sensors.")
+    files = analysis_files(exchange)
     bundle = load_bundle(files)
-    again = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
-    assert {p.reason for p in again.parameters if p.name in DISTANCES} == {"estimator_bad"}
+    second_gait = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
+    assert {p.reason for p in second_gait.parameters if p.name in DISTANCES} == {"estimator_bad"}
 
 
 @pytest.mark.slow
 def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone() -> None:
-    found = sparse()
-    assert found.poses is not None
-    assert found.feet is not None
-    assert found.orientations is not None
-    assert not found.feet.withheld
+    results = sparse()
+    assert results.poses is not None
+    assert results.feet is not None
+    assert results.orientations is not None
+    assert not results.feet.withheld
     refused = HealthFinding("zero_velocity_refused_pct", "foot_l", 42.0, *REFUSED_PCT)
     assert refused.verdict == "bad"
-    poses = replace(found.poses, health=(refused,))
-    made = withhold_distances(PoseEstimate(found.orientations, poses, found.feet))
-    assert made.feet is not None
-    assert made.feet.withheld == {"left": "path_bad"}
-    (told,) = (n.message for n in made.poses.notices if n.code == "distances_withheld")
-    assert "left foot are withheld: the path does not fit its rests on the floor" in told
+    poses = replace(results.poses, health=(refused,))
+    result = withhold_distances(PoseEstimate(results.orientations, poses, results.feet))
+    assert result.feet is not None
+    assert result.feet.withheld == {"left": "path_bad"}
+    (notices,) = (n.message for n in result.poses.notices if n.code == "distances_withheld")
+    assert "left foot are withheld: the path does not fit its rests on the floor" in notices
     assert "path" in REASONS["path_bad"]
     assert "sensors" not in REASONS["path_bad"]
-    assert found.tracks is not None
-    measured = measure_gait(replace(found.tracks, feet=made.feet))
-    of = {(p.name, p.side): p for p in measured.parameters}
-    assert of["stride_length_m", "left"].reason == "path_bad"
-    assert of["stride_length_m", "right"].mean is not None
-    assert of["gait_speed_mps", None].n == of["stride_length_m", "right"].n
-    assert of["total_distance_m", None].n == 1
+    assert results.tracks is not None
+    measured = measure_gait(replace(results.tracks, feet=result.feet))
+    source = {(p.name, p.side): p for p in measured.parameters}
+    assert source["stride_length_m", "left"].reason == "path_bad"
+    assert source["stride_length_m", "right"].mean is not None
+    assert source["gait_speed_mps", None].n == source["stride_length_m", "right"].n
+    assert source["total_distance_m", None].n == 1
 
 
 @pytest.mark.slow
 def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None:
-    found = at_the_bound(sparse())
-    assert found.measured is not None
-    knees = {(p.name, p.side): p for p in found.parameters if p.name.startswith("knee_")}
+    result = at_the_bound(sparse())
+    assert result.measured is not None
+    knees = {(p.name, p.side): p for p in result.parameters if p.name.startswith("knee_")}
     for side in ("left", "right"):
         p = knees["knee_flexion_min_stance_deg", side]
         assert (p.mean, p.sd, p.reason) == (None, None, "at_bound")
         peak = knees["knee_flexion_max_swing_deg", side]
         assert peak.mean is not None
         assert peak.mean > 45.0
-    column = found.measured.columns["knee_flexion_min_stance_deg"]
-    counted = [v for v, s in zip(column, found.measured.strides.strides, strict=True) if not s.flags]
-    assert len(counted) > 10
-    assert set(counted) == {None}
+    column = result.measured.columns["knee_flexion_min_stance_deg"]
+    counted_strides = [v for v, s in zip(column, result.measured.strides.strides, strict=True) if not s.flags]
+    assert len(counted_strides) > 10
+    assert set(counted_strides) == {None}
     # no spread of zero is left anywhere
     assert all(p.sd is None or p.sd > 0.05 for p in knees.values())
     # nor in any point of a curve that the figures are read from
-    bundle = load_bundle(analysis_files(found))
+    bundle = load_bundle(analysis_files(result))
     report = report_model(bundle)
     rows = [line.split(",") for line in curves_csv(report).decode().splitlines()]
     mean, reason = rows[0].index("mean_deg"), rows[0].index("reason")
@@ -217,17 +217,17 @@ def test_a_figure_that_rests_on_the_bound_of_the_leg_model_is_withheld() -> None
     assert {r[reason] for r in written if not r[mean]} == {"at_bound"}
     assert {r[reason] for r in written if r[mean]} == {""}
     for side, bound in (("left", "knee_flexion_l"), ("right", "knee_flexion_r")):
-        told = [float(r[mean]) for r in written if r[1] == side and r[mean]]
-        assert min(told) > np.degrees(found.angles.bounds[bound] if found.angles else np.nan) + 0.1
-        shown = report.replay["curves"]["knee_flexion"][side]  # type: ignore[index]
-        assert [x is None for x in shown] == [not r[mean] for r in written if r[1] == side]
-        assert None in shown
+        notices = [float(r[mean]) for r in written if r[1] == side and r[mean]]
+        assert min(notices) > np.degrees(result.angles.bounds[bound] if result.angles else np.nan) + 0.1
+        visible_replay = report.replay["curves"]["knee_flexion"][side]  # type: ignore[index]
+        assert [x is None for x in visible_replay] == [not r[mean] for r in written if r[1] == side]
+        assert None in visible_replay
     assert any(note.startswith("Knee flexion: interrupted") for note in report.curve_notes)
     drawn = cycle_svg(report.key_curve)
     assert "nan" not in drawn
     assert drawn.split('class="ml" d="')[1].split('"')[0].count("M") > 1
     assert bundle.angles is not None
-    assert bundle.angles.bounds == pytest.approx(found.angles.bounds if found.angles else {})
+    assert bundle.angles.bounds == pytest.approx(result.angles.bounds if result.angles else {})
 
 
 HINGED = {f"{v}_{side}" for v in HINGES for side in "lr"}
@@ -240,19 +240,19 @@ HINGED = {f"{v}_{side}" for v in HINGES for side in "lr"}
 def test_what_the_leg_model_holds_fixed_is_no_result(
     take: Callable[[], TakeAnalysis], fixed: set[str]
 ) -> None:
-    found = take()
-    assert found.angles is not None
-    assert {n for n, why in found.angles.withheld.items() if why == "fixed_by_model"} == fixed
-    assert not fixed & set(found.angles.angles)
+    trial = take()
+    assert trial.angles is not None
+    assert {n for n, cause in trial.angles.withheld.items() if cause == "fixed_by_model"} == fixed
+    assert not fixed & set(trial.angles.angles)
     # the others move
-    assert all(np.nanstd(x) > np.radians(0.1) for x in found.angles.angles.values())
+    assert all(np.nanstd(x) > np.radians(0.1) for x in trial.angles.angles.values())
     variables = {name.removesuffix("_l").removesuffix("_r") for name in fixed}
-    assert found.measured is not None
-    curves = cycle_curves(found.angles, found.measured.strides)
+    assert trial.measured is not None
+    curves = cycle_curves(trial.angles, trial.measured.strides)
     for variable in variables:
         assert curves.why[variable] == dict.fromkeys(("left", "right"), "fixed_by_model")
-    assert "angles_withheld" not in [n.code for n in found.notices]
-    bundle = load_bundle(analysis_files(found))
+    assert "angles_withheld" not in [n.code for n in trial.notices]
+    bundle = load_bundle(analysis_files(trial))
     report = report_model(bundle)
     panels = {p.variable.name: p for p in report.panels}
     assert {v for v, p in panels.items() if p.reason == REASONS["fixed_by_model"]} == variables
@@ -264,8 +264,8 @@ def test_what_the_leg_model_holds_fixed_is_no_result(
     assert ("pelvic tilt" in notes) == (take is sparse)
     assert "Ankle, hip, knee angles of both sides are estimated" in notes
     # the figure keeps what it is drawn with
-    assert found.poses is not None
-    assert {"shank_l", "thigh_l", "pelvis"} <= set(found.poses.q)
+    assert trial.poses is not None
+    assert {"shank_l", "thigh_l", "pelvis"} <= set(trial.poses.q)
 
 
 @pytest.mark.slow
@@ -274,28 +274,28 @@ def test_what_the_leg_model_holds_fixed_is_no_result(
 )
 def test_nothing_is_withheld_of_a_right_setup(walk: str) -> None:
     recording = neura_recording() if walk == "neura" else simulate_scenario(walk, 0).recording
-    found = analyse(recording)
-    assert found.angles is not None
-    assert (found.angles.withheld, found.angles.bounds) == ({}, {})
+    analysis = analyse(recording)
+    assert analysis.angles is not None
+    assert (analysis.angles.withheld, analysis.angles.bounds) == ({}, {})
     withheld = {"estimator_bad", "path_bad", "at_bound", "impossible"}
-    assert not [p for p in found.parameters if p.reason in withheld]
+    assert not [p for p in analysis.parameters if p.reason in withheld]
 
 
 def strides(step_s: float) -> Strides:
     """Strides of one second of both feet, the left contact `step_s` after the right one."""
-    made = []
+    result = []
     for k in range(8):
-        for side, shift, other in (("right", 0.0, step_s), ("left", step_s, 1.0)):
+        for side, shift, second in (("right", 0.0, step_s), ("left", step_s, 1.0)):
             start = k + shift
-            made.append(
-                Stride(side, start, start + 0.6, start + 1.0, start + 0.1, k + other)  # type: ignore[arg-type]
+            result.append(
+                Stride(side, start, start + 0.6, start + 1.0, start + 0.1, k + second)  # type: ignore[arg-type]
             )
-    return Strides(tuple(made))
+    return Strides(tuple(result))
 
 
 def test_a_step_that_nobody_can_take_is_not_told() -> None:
-    found = {(p.name, p.side): p for p in summarise_times(strides(0.12))}
-    short, long = found["step_time_s", "left"], found["step_time_s", "right"]
+    result = {(p.name, p.side): p for p in summarise_times(strides(0.12))}
+    short, long = result["step_time_s", "left"], result["step_time_s", "right"]
     values = {p.reason for p in (short, long)}
     assert "impossible" in values
     assert all(p.mean is None or p.mean >= 0.2 for p in (short, long))
@@ -306,12 +306,12 @@ def test_a_step_that_nobody_can_take_is_not_told() -> None:
 
 @pytest.mark.parametrize("step_s", [0.02, 0.1, 0.19, 0.22, 0.24])
 def test_a_cadence_that_nobody_can_walk_is_not_told(step_s: float) -> None:
-    made = tuple(
+    result = tuple(
         Stride(side, t, t + 1.2 * step_s, t + 2 * step_s, t + 0.1 * step_s, t + step_s)  # type: ignore[arg-type]
         for k in range(20)
         for side, t in (("right", 2 * k * step_s), ("left", (2 * k + 1) * step_s))
     )
-    (cadence,) = (p for p in summarise_times(Strides(made)) if p.name == "cadence_spm")
+    (cadence,) = (p for p in summarise_times(Strides(result)) if p.name == "cadence_spm")
     assert (cadence.mean, cadence.n, cadence.reason) == (None, 0, "impossible")
 
 
@@ -328,20 +328,22 @@ def test_a_knee_that_no_knee_can_be_is_not_told() -> None:
     knees = [p for p in summarise_angles(curves) if p.name.startswith("knee_") and p.side == "right"]
     assert all((p.mean, p.reason) == (None, "impossible") for p in knees)
     assert np.isnan(curves.curves["knee_flexion"]["right"]).all()
-    told = [
+    notices = [
         p for p in summarise_angles(cycle_curves(bent(-15.0), strides(0.5))) if p.name.startswith("knee_")
     ]
-    assert all(p.mean is not None for p in told if p.side == "right")
+    assert all(p.mean is not None for p in notices if p.side == "right")
     # who stands with the knee bent by 25° and was measured so may be 35° straighter
     crouched = replace(bent(-35.0), standing_deg={"knee_flexion_r": 25.0})
-    known = [p for p in summarise_angles(cycle_curves(crouched, strides(0.5))) if p.name.startswith("knee_")]
-    assert all(p.mean is not None for p in known if p.side == "right")
+    reference = [
+        p for p in summarise_angles(cycle_curves(crouched, strides(0.5))) if p.name.startswith("knee_")
+    ]
+    assert all(p.mean is not None for p in reference if p.side == "right")
 
 
 def test_what_nobody_can_do_is_not_told_live_either() -> None:
     angles = bent(-35.0)
     quick = Stride("right", 2.0, 2.6, 3.0, 2.1, 2.9)
-    found, curves = early_figures(quick, StrideSpan(angles.t_s, {}, {}, angles, None), GROUND)
-    assert found["step_time_s"] == "impossible"
-    assert found["knee_flexion_rom_deg"] == "impossible"
+    result, curves = early_figures(quick, StrideSpan(angles.t_s, {}, {}, angles, None), GROUND)
+    assert result["step_time_s"] == "impossible"
+    assert result["knee_flexion_rom_deg"] == "impossible"
     assert "knee_flexion" not in curves

@@ -30,9 +30,9 @@ def apart_m(analysis: TakeAnalysis) -> Floats:
     """Distance of the ankles across the line from hip to hip, per sample."""
     assert analysis.poses is not None
     p = analysis.poses.p
-    across = p["thigh_l"] - p["thigh_r"]
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return np.asarray(np.sum((p["foot_l"] - p["foot_r"]) * across, axis=1))
+    lateral = p["thigh_l"] - p["thigh_r"]
+    lateral /= np.linalg.norm(lateral, axis=1, keepdims=True)
+    return np.asarray(np.sum((p["foot_l"] - p["foot_r"]) * lateral, axis=1))
 
 
 def standing(analysis: TakeAnalysis) -> slice:
@@ -44,14 +44,14 @@ def standing(analysis: TakeAnalysis) -> slice:
 @pytest.mark.sweep
 @pytest.mark.parametrize("width", [0.1, 0.3])
 def test_the_figure_stands_as_wide_as_measured(width: float) -> None:
-    made = analysed(width)
-    assert apart_m(made)[standing(made)].mean() == pytest.approx(width, abs=0.02)
+    result = analysed(width)
+    assert apart_m(result)[standing(result)].mean() == pytest.approx(width, abs=0.02)
 
 
 @pytest.mark.slow
 def test_steps_are_wider_by_what_standing_was_wider() -> None:
-    def width(of: TakeAnalysis, side: Side) -> float:
-        mean = next(p.mean for p in of.parameters if (p.name, p.side) == ("step_width_m", side))
+    def width(source: TakeAnalysis, side: Side) -> float:
+        mean = next(p.mean for p in source.parameters if (p.name, p.side) == ("step_width_m", side))
         assert mean is not None
         return mean
 

@@ -30,10 +30,10 @@ def beside(n: int) -> tuple[SensorView, SensorView]:
 def test_arms_are_found_from_the_acceleration_of_one_point() -> None:
     first, second = beside(500)
     nominal = ARMS_TO_JOINT + 0.02
-    found = ask_joint(first, second, nominal, 0.05**2 * np.eye(ARMS), RATE_HZ, ArmParams())
-    assert found is not None
-    assert found.misfit < 0.01
-    np.testing.assert_allclose(np.linalg.solve(found.L, found.h), ARMS_TO_JOINT, atol=1e-3)
+    result = ask_joint(first, second, nominal, 0.05**2 * np.eye(ARMS), RATE_HZ, ArmParams())
+    assert result is not None
+    assert result.misfit < 0.01
+    np.testing.assert_allclose(np.linalg.solve(result.L, result.h), ARMS_TO_JOINT, atol=1e-3)
 
 
 def test_with_hardly_any_walking_a_joint_says_nothing() -> None:

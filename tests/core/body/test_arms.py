@@ -40,7 +40,7 @@ def true_arms(calibrated: CalibratedRecording) -> dict[tuple[Segment, Segment], 
     walked = np.zeros(len(truth.t_s), bool)
     for a, b in calibrated.calibration.walking:
         walked |= (truth.t_s >= a) & (truth.t_s < b)
-    found = {}
+    result = {}
     for joint, centres in joint_places(truth.body).items():
         arms = []
         for segment, centre in zip(joint, centres, strict=True):
@@ -50,8 +50,8 @@ def true_arms(calibrated: CalibratedRecording) -> dict[tuple[Segment, Segment], 
             r = np.atleast_2d(rotate(conjugate(q), centre - mount.position_m - shift))
             r = np.broadcast_to(r, (len(walked), 3))[walked].mean(axis=0)
             arms.append(calibrated.calibration.segments[segment].R_segment_sensor @ r)
-        found[joint] = (arms[0], arms[1])
-    return found
+        result[joint] = (arms[0], arms[1])
+    return result
 
 
 def arms_of(
@@ -62,19 +62,19 @@ def arms_of(
 
 def test_on_skin_arms_come_out_within_a_centimetre_of_the_truth() -> None:
     calibrated, orientations = walk()
-    found = measure_arms(calibrated, orientations, BODY, WHOLE)
+    result = measure_arms(calibrated, orientations, BODY, WHOLE)
     guesses = {s: sensor_place(s, BODY) for s in WHOLE}
-    before, after, scores = [], [], []
+    initial, final, scores = [], [], []
     for joint, true in true_arms(calibrated).items():
-        assert found.joints[joint].asked
-        ours = arms_of(found.joints[joint].centre, found.places, joint)
-        usual = arms_of(found.joints[joint].guess, guesses, joint)
+        assert result.joints[joint].asked
+        ours = arms_of(result.joints[joint].centre, result.places, joint)
+        usual = arms_of(result.joints[joint].guess, guesses, joint)
         for k, segment in enumerate(joint):
-            heard = found.sensors[segment].taken
-            before.append((usual[k] - true[k])[heard])
-            after.append((ours[k] - true[k])[heard])
-            scores.append(after[-1] / found.sensors[segment].sd[heard])
-    rms = [float(np.sqrt(np.mean(np.concatenate(x) ** 2))) for x in (before, after)]
+            heard = result.sensors[segment].taken
+            initial.append((usual[k] - true[k])[heard])
+            final.append((ours[k] - true[k])[heard])
+            scores.append(final[-1] / result.sensors[segment].sd[heard])
+    rms = [float(np.sqrt(np.mean(np.concatenate(x) ** 2))) for x in (initial, final)]
     assert rms[0] > 0.02
     assert rms[1] < 0.01
     # what is said of its own uncertainty holds
@@ -82,9 +82,9 @@ def test_on_skin_arms_come_out_within_a_centimetre_of_the_truth() -> None:
 
 
 def test_the_place_across_a_thigh_stays_the_usual_one() -> None:
-    found = measure_arms(*walk(), BODY, WHOLE)
+    result = measure_arms(*walk(), BODY, WHOLE)
     for segment in ("thigh_l", "thigh_r"):
-        sensor = found.sensors[segment]
+        sensor = result.sensors[segment]
         assert sensor.taken.tolist() == [True, True, False]
         assert sensor.place[2] == sensor.guess[2]
         assert sensor.sd[2] == ArmParams().place_sd["thigh"][2]
@@ -94,14 +94,14 @@ def test_the_place_across_a_thigh_stays_the_usual_one() -> None:
 def test_forward_axes_that_are_all_turned_alike_are_told_and_keep_the_arms(turn_deg: float) -> None:
     """No joint sees it; that sensors then seem to sit beside their places does."""
     turned = turn_forward_axes(*walk(), {s: float(np.radians(turn_deg)) for s in WHOLE})
-    straight, found = measure_arms(*walk(), BODY, WHOLE), measure_arms(*turned, BODY, WHOLE)
+    straight, result = measure_arms(*walk(), BODY, WHOLE), measure_arms(*turned, BODY, WHOLE)
     assert report_ahead(straight) == ()
-    (notice,) = report_ahead(found)
+    (notice,) = report_ahead(result)
     assert notice.code == "forward_against_places"
     assert f"to the {'right' if turn_deg > 0.0 else 'left'}" in notice.message
-    assert abs(np.degrees(found.ahead) - turn_deg) < 10.0
+    assert abs(np.degrees(result.ahead) - turn_deg) < 10.0
     back = to_matrix(about(1, -np.radians(turn_deg)))
-    off = [np.linalg.norm(back @ found.places[s] - straight.places[s]) for s in ("foot_r", "foot_l")]
+    off = [np.linalg.norm(back @ result.places[s] - straight.places[s]) for s in ("foot_r", "foot_l")]
     assert max(off) < 0.02
 
 
@@ -112,19 +112,19 @@ def test_legs_end_side_by_side_as_far_as_motion_lets_them(monkeypatch: pytest.Mo
         centres = body_arms.centres
         return float(sum(c[0] if joint[1].endswith("_r") else -c[0] for joint, c in centres.items()))
 
-    beside = ahead_of(measure_arms(*walk(), BODY, WHOLE))
+    neighbour = ahead_of(measure_arms(*walk(), BODY, WHOLE))
     monkeypatch.setattr(arms, "BESIDE_SD_M", 10.0)
     anywhere = ahead_of(measure_arms(*walk(), BODY, WHOLE))
-    assert abs(beside) < 0.75 * abs(anywhere)
+    assert abs(neighbour) < 0.75 * abs(anywhere)
     monkeypatch.setattr(arms, "BESIDE_SD_M", 1e-4)
     assert abs(ahead_of(measure_arms(*walk(), BODY, WHOLE))) < 1e-3
 
 
-def assert_as_usual(found: MeasuredArms) -> None:
-    for sensor in found.sensors.values():
+def assert_as_usual(result: MeasuredArms) -> None:
+    for sensor in result.sensors.values():
         np.testing.assert_array_equal(sensor.place, sensor.guess)
         assert not sensor.taken.any()
-    for joint in found.joints.values():
+    for joint in result.joints.values():
         np.testing.assert_allclose(joint.centre, joint.guess, atol=1e-12)
         assert not joint.asked
 
@@ -138,9 +138,9 @@ def test_where_nobody_walked_everything_is_as_usual() -> None:
 
 
 def test_sensors_without_a_joint_between_them_say_nothing() -> None:
-    found = measure_arms(*walk(), BODY, PRESETS["feet_pelvis3"])
-    assert found.joints == {}
-    assert_as_usual(found)
+    result = measure_arms(*walk(), BODY, PRESETS["feet_pelvis3"])
+    assert result.joints == {}
+    assert_as_usual(result)
 
 
 def test_a_joint_that_does_not_hold_together_is_not_heard() -> None:
@@ -149,29 +149,29 @@ def test_a_joint_that_does_not_hold_together_is_not_heard() -> None:
     late = sensors["foot_l"]
     sensors["foot_l"] = replace(late, acc=np.roll(late.acc, 40, axis=0), gyr=np.roll(late.gyr, 40, axis=0))
     wrong = replace(calibrated, recording=replace(calibrated.recording, sensors=sensors))
-    found = measure_arms(wrong, orientations, BODY, WHOLE)
-    ankle = found.joints["shank_l", "foot_l"]
+    result = measure_arms(wrong, orientations, BODY, WHOLE)
+    ankle = result.joints["shank_l", "foot_l"]
     assert ankle.misfit is not None
     assert ankle.misfit > ArmParams().worst_misfit
     assert not ankle.asked
-    np.testing.assert_array_equal(found.places["foot_l"], sensor_place("foot_l", BODY))
-    assert found.joints["shank_r", "foot_r"].asked
+    np.testing.assert_array_equal(result.places["foot_l"], sensor_place("foot_l", BODY))
+    assert result.joints["shank_r", "foot_r"].asked
 
 
 def test_the_tree_has_the_measured_arms() -> None:
     calibrated, orientations = walk()
-    found = measure_arms(calibrated, orientations, BODY, WHOLE)
+    result = measure_arms(calibrated, orientations, BODY, WHOLE)
     mounts = {s: calibrated.calibration.segments[s].R_segment_sensor for s in WHOLE}
-    tree = person_tree(BODY, mounts, WHOLE, found.places, found.centres)
+    tree = person_tree(BODY, mounts, WHOLE, result.places, result.centres)
     for joint in tree.joints:
         pair = (WHOLE[joint.proximal], WHOLE[joint.distal])
-        near, far = arms_of(found.centres[pair], found.places, pair)
+        near, far = arms_of(result.centres[pair], result.places, pair)
         np.testing.assert_allclose(mounts[pair[0]] @ joint.r_proximal, near, atol=1e-12)
         np.testing.assert_allclose(mounts[pair[1]] @ joint.r_distal, far, atol=1e-12)
 
 
 @pytest.mark.parametrize("part", [slice(0, 3), slice(3, 7)])
 def test_any_part_of_the_body_may_be_worn(part: slice) -> None:
-    found = measure_arms(*walk(), BODY, WHOLE[part])
-    assert set(found.sensors) == set(WHOLE[part])
-    assert all(set(joint) <= set(WHOLE[part]) for joint in found.joints)
+    result = measure_arms(*walk(), BODY, WHOLE[part])
+    assert set(result.sensors) == set(WHOLE[part])
+    assert all(set(joint) <= set(WHOLE[part]) for joint in result.joints)

@@ -37,8 +37,10 @@ def mounted(take: UniformRecording, params: PoseParams) -> MountedSensors:
 
 def estimated(take: UniformRecording, params: PoseParams | None = None) -> PoseEstimate:
     params = params or PoseParams()
-    found = events.detect(estimate_orientations(calibration.calibrate(take)))
-    contacts = {s: contact_mask(take.t_s, found.times(s, "ic"), found.times(s, "tc")) for s in SIDES}
+    detections = events.detect(estimate_orientations(calibration.calibrate(take)))
+    contacts = {
+        s: contact_mask(take.t_s, detections.times(s, "ic"), detections.times(s, "tc")) for s in SIDES
+    }
     return estimate_poses(mounted(take, params), contacts, params)
 
 
@@ -78,12 +80,12 @@ def test_what_is_worn_decides(worn: set[Segment], first: str | None) -> None:
 
 @pytest.mark.sweep
 def test_seven_sensors_walk_through_the_room_as_the_person_did() -> None:
-    made = walk()
-    assert made.poses.method == "erkf_smoothed"
-    assert made.poses.reduced is None
-    assert made.orientations.engine == "erkf_smoothed"
-    n = min(len(made.poses.t_s), len(truth().t_s))
-    path, true = made.poses.p["pelvis"][:n, :2], truth().p["pelvis"][:n, :2]
+    result = walk()
+    assert result.poses.method == "erkf_smoothed"
+    assert result.poses.reduced is None
+    assert result.orientations.engine == "erkf_smoothed"
+    n = min(len(result.poses.t_s), len(truth().t_s))
+    path, true = result.poses.p["pelvis"][:n, :2], truth().p["pelvis"][:n, :2]
     # a common heading is free: the two paths are laid on each other before they are compared
     apart = _after_turning(path - path[0], true - true[0])
     assert np.abs(apart).max() < 0.6
@@ -107,8 +109,8 @@ def test_the_floor_stays_at_zero_and_segments_hang_together() -> None:
 def test_feet_are_linked_only_by_a_whole_chain() -> None:
     assert walk().feet is not None
     assert walk().feet.linked  # type: ignore[union-attr]
-    for worn in (PELVIS_FEET, FEET):
-        feet = walk(*worn).feet
+    for segments in (PELVIS_FEET, FEET):
+        feet = walk(*segments).feet
         assert feet is not None
         assert not feet.linked
         assert feet.source == "erkf_feet"
@@ -123,11 +125,11 @@ def test_feet_are_linked_only_by_a_whole_chain() -> None:
 def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
     worn: tuple[Segment, ...], method: str
 ) -> None:
-    made = walk(*worn)
-    assert made.poses.method == method
-    assert set(made.poses.q) == set(WHOLE)
+    result = walk(*worn)
+    assert result.poses.method == method
+    assert set(result.poses.q) == set(WHOLE)
     zero = calibration.calibrate(only(simulated("fast_with_turns", 3)[0], *worn)).calibration.zero
-    angles = measure_angles(made.orientations, zero, made.poses)
+    angles = measure_angles(result.orientations, zero, result.poses)
     assert len(angles.angles) == 20
     estimated_names = set(angles.diagnostics["estimated"])  # type: ignore[call-overload]
     assert {n for n in angles.angles if not n.startswith("pelvis")} <= estimated_names
@@ -137,44 +139,44 @@ def test_few_sensors_give_a_figure_and_all_angles_named_as_estimated(
 @pytest.mark.sweep
 def test_a_failed_thigh_leaves_the_other_leg_as_measured_and_estimates_the_rest() -> None:
     take = failing(simulated("fast_with_turns", 3)[0], "thigh_l", 15.0)
-    made = estimated(take)
-    assert made.poses.method == "l7s_3i"
-    assert made.poses.reduced == "sensor_failed"
-    (told,) = [n for n in made.poses.notices if n.code == "sensor_failed"]
-    assert told.sensor == "thigh_l"
-    assert "50%" in told.message
+    estimate = estimated(take)
+    assert estimate.poses.method == "l7s_3i"
+    assert estimate.poses.reduced == "sensor_failed"
+    (notices,) = [n for n in estimate.poses.notices if n.code == "sensor_failed"]
+    assert notices.sensor == "thigh_l"
+    assert "50%" in notices.message
     zero = calibration.calibrate(take).calibration.zero
-    angles = measure_angles(made.orientations, zero, made.poses)
+    angles = measure_angles(estimate.orientations, zero, estimate.poses)
     names = {n.rpartition("_") for n in angles.diagnostics["estimated"]}  # type: ignore[attr-defined]
     assert {(base.split("_")[0], side) for base, _, side in names} == {("hip", "l"), ("knee", "l")}
 
 
 @pytest.mark.sweep
 def test_a_failed_foot_leaves_one_leg_with_the_pelvis() -> None:
-    made = estimated(failing(simulated("fast_with_turns", 3)[0], "foot_l", 15.0))
-    assert made.poses.method == "erkf_smoothed"
-    assert set(made.poses.q) == {"pelvis", "thigh_r", "shank_r", "foot_r"}
-    assert made.feet is not None
-    assert set(made.feet.p) == {"right"}
-    assert {n.code for n in made.poses.notices} >= {"sensor_failed", "figure_incomplete"}
+    estimate = estimated(failing(simulated("fast_with_turns", 3)[0], "foot_l", 15.0))
+    assert estimate.poses.method == "erkf_smoothed"
+    assert set(estimate.poses.q) == {"pelvis", "thigh_r", "shank_r", "foot_r"}
+    assert estimate.feet is not None
+    assert set(estimate.feet.p) == {"right"}
+    assert {n.code for n in estimate.poses.notices} >= {"sensor_failed", "figure_incomplete"}
 
 
 @pytest.mark.sweep
 def test_a_short_loss_is_no_failure() -> None:
     take = simulated("lost_sensor", 41)[0]
-    made = estimated(take)
-    assert made.poses.method == "erkf_smoothed"
-    assert made.poses.reduced is None
+    estimate = estimated(take)
+    assert estimate.poses.method == "erkf_smoothed"
+    assert estimate.poses.reduced is None
 
 
 @pytest.mark.sweep
 def test_another_estimator_runs_on_the_same_take() -> None:
     take = simulated("fast_with_turns", 3)[0]
     for name, method in (("l7s_3i", "l7s_3i"), ("stance_foot_anchor", "stance_foot_anchor")):
-        made = estimated(take, PoseParams(estimator=name))  # type: ignore[arg-type]
-        assert made.poses.method == method
-        assert made.poses.diagnostics["requested"] == name
-        assert made.feet is not None
+        estimate = estimated(take, PoseParams(estimator=name))  # type: ignore[arg-type]
+        assert estimate.poses.method == method
+        assert estimate.poses.diagnostics["requested"] == name
+        assert estimate.feet is not None
 
 
 def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
@@ -187,12 +189,12 @@ def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
 def test_an_unasked_estimator_that_fails_gives_way_to_the_next() -> None:
     sensors = mounted(simulated("fast_with_turns", 3)[0], PoseParams())
     broken = replace(sensors, body=replace(sensors.body, thigh=-0.4))
-    made = estimate_poses(broken, {}, PoseParams())
-    assert made.poses.reduced == "estimator_failed"
-    assert [n.code for n in made.poses.notices].count("estimator_failed") >= 1
-    assert "thigh" in made.poses.notices[0].message
-    assert made.feet is None
-    assert "foot_paths_failed" in {n.code for n in made.poses.notices}
+    result = estimate_poses(broken, {}, PoseParams())
+    assert result.poses.reduced == "estimator_failed"
+    assert [n.code for n in result.poses.notices].count("estimator_failed") >= 1
+    assert "thigh" in result.poses.notices[0].message
+    assert result.feet is None
+    assert "foot_paths_failed" in {n.code for n in result.poses.notices}
 
 
 @pytest.mark.sweep
@@ -200,10 +202,10 @@ def test_without_an_answer_of_the_joints_the_next_estimator_is_used() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     assert set(sensors.turned_rad) == set(WHOLE)
     failed = replace(sensors, failure=EstimationError("filter_diverged", "It diverged."))
-    made = estimate_poses(failed, {}, PoseParams())
-    assert made.poses.reduced == "estimator_failed"
-    assert made.poses.method == "l7s_3i"
-    assert "erkf cannot estimate this take" in made.poses.notices[0].message
+    result = estimate_poses(failed, {}, PoseParams())
+    assert result.poses.reduced == "estimator_failed"
+    assert result.poses.method == "l7s_3i"
+    assert "erkf cannot estimate this take" in result.poses.notices[0].message
 
 
 def handed_on(sensors: MountedSensors) -> tuple[MountedSensors, dict[Segment, weakref.ref[Floats]]]:
@@ -217,22 +219,22 @@ def handed_on(sensors: MountedSensors) -> tuple[MountedSensors, dict[Segment, we
 def test_the_erkf_lets_go_of_orientations_that_nobody_else_reads_and_finds_the_same() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(sensors)
-    made, whole = (estimate_poses(x, {}, PoseParams()) for x in (handed, sensors))
-    assert [s for s, there in watched.items() if there() is not None] == []
-    assert list(made.orientations.q) == list(whole.orientations.q)
+    result, whole = (estimate_poses(x, {}, PoseParams()) for x in (handed, sensors))
+    assert [s for s, target in watched.items() if target() is not None] == []
+    assert list(result.orientations.q) == list(whole.orientations.q)
     for s, q in whole.orientations.q.items():
-        np.testing.assert_array_equal(made.orientations.q[s], q)
+        np.testing.assert_array_equal(result.orientations.q[s], q)
     for s, p in whole.poses.p.items():
-        np.testing.assert_array_equal(made.poses.p[s], p)
+        np.testing.assert_array_equal(result.poses.p[s], p)
 
 
 @pytest.mark.sweep
 def test_where_the_erkf_fails_the_next_estimator_still_reads_the_orientations() -> None:
     sensors = mounted(only(simulated("fast_with_turns", 3)[0], *WHOLE), PoseParams())
     handed, watched = handed_on(replace(sensors, failure=EstimationError("filter_diverged", "It diverged.")))
-    made = estimate_poses(handed, {}, PoseParams())
-    assert made.poses.method == "l7s_3i"
-    assert all(there() is not None for there in watched.values())
+    result = estimate_poses(handed, {}, PoseParams())
+    assert result.poses.method == "l7s_3i"
+    assert all(target() is not None for target in watched.values())
 
 
 def test_only_where_the_erkf_runs_forward_axes_are_turned_by_the_joints() -> None:

@@ -1,4 +1,4 @@
-"""What is wrong with a set-up shows in a measured quantity; what is right is not accused."""
+"""Set-up errors appear in a health measure; correct set-ups raise no alarm."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ def changed(recording: UniformRecording, segment: Segment, **signals: object) ->
     return replace(recording, sensors={**recording.sensors, segment: replace(was, **signals)})  # type: ignore[arg-type]
 
 
-def codes(made: PoseEstimate) -> set[str]:
-    return {n.code for n in made.poses.notices}
+def codes(result: PoseEstimate) -> set[str]:
+    return {n.code for n in result.poses.notices}
 
 
-def residuals(made: PoseEstimate) -> dict[str | None, float]:
-    return {f.of: f.value for f in made.poses.health if f.name == "joint_residual_mm"}
+def residuals(result: PoseEstimate) -> dict[str | None, float]:
+    return {f.of: f.value for f in result.poses.health if f.name == "joint_residual_mm"}
 
 
 def test_a_verdict_follows_the_limits() -> None:
@@ -62,35 +62,38 @@ def test_the_longest_run_is_found_wherever_it_lies() -> None:
     sweep_after(1, [("comfortable", 3), ("fast_with_turns", 2), ("hemiparetic", 4), ("drop_foot", 5)]),
 )
 def test_a_right_set_up_is_not_accused(name: str, seed: int) -> None:
-    made = estimated(take(seed, name))
+    estimate = estimated(take(seed, name))
     accused = {"sensors_do_not_hang_together", "zero_velocity_refused", "foot_never_still", "started_moving"}
-    assert not codes(made) & accused
-    assert max(residuals(made).values()) < 10.0
-    assert find_worst_verdict([f for f in made.poses.health if f.name != "forward_axis_turned_deg"]) == "good"
+    assert not codes(estimate) & accused
+    assert max(residuals(estimate).values()) < 10.0
+    assert (
+        find_worst_verdict([f for f in estimate.poses.health if f.name != "forward_axis_turned_deg"])
+        == "good"
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("a", "b"), [("thigh_l", "thigh_r"), ("shank_l", "shank_r"), ("foot_l", "foot_r")])
 def test_exchanged_sides_do_not_hang_together(a: Segment, b: Segment) -> None:
-    made = estimated(swapped(take(), a, b))
-    assert "sensors_do_not_hang_together" in codes(made)
+    estimate = estimated(swapped(take(), a, b))
+    assert "sensors_do_not_hang_together" in codes(estimate)
     # places found from motion bend a little towards a wrong set-up
-    assert max(residuals(made).values()) > 25.0
+    assert max(residuals(estimate).values()) > 25.0
 
 
 @pytest.mark.slow
 def test_exchanged_segments_of_one_leg_are_told() -> None:
-    made = estimated(swapped(take(), "thigh_l", "shank_l"))
-    assert find_worst_verdict(made.poses.health) != "good"
-    assert codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}
+    estimate = estimated(swapped(take(), "thigh_l", "shank_l"))
+    assert find_worst_verdict(estimate.poses.health) != "good"
+    assert codes(estimate) & {"sensors_do_not_hang_together", "heading_corrected"}
 
 
 @pytest.mark.slow
 def test_a_late_sensor_shows_in_its_joints() -> None:
     was = take().sensors["thigh_r"]
     acc, gyr = (np.roll(x, 30, axis=0).copy() for x in (was.acc, was.gyr))
-    made = estimated(changed(take(), "thigh_r", acc=acc, gyr=gyr))
-    right, left = residuals(made)["pelvis-thigh_r"], residuals(made)["pelvis-thigh_l"]
+    estimate = estimated(changed(take(), "thigh_r", acc=acc, gyr=gyr))
+    right, left = residuals(estimate)["pelvis-thigh_r"], residuals(estimate)["pelvis-thigh_l"]
     assert right > 2.0 * left
 
 
@@ -98,10 +101,10 @@ def test_a_late_sensor_shows_in_its_joints() -> None:
 def test_a_foot_that_never_rests_is_told() -> None:
     was = take().sensors["foot_l"]
     shaken = was.gyr + 1.5 * np.sin(2 * np.pi * 7.0 * take().t_s)[:, None] * (take().t_s > 8.0)[:, None]
-    made = estimated(changed(take(), "foot_l", gyr=shaken))
-    assert "foot_never_still" in codes(made)
-    (told,) = [f for f in made.poses.health if (f.name, f.of) == ("longest_moving_s", "foot_l")]
-    assert told.verdict == "bad"
+    estimate = estimated(changed(take(), "foot_l", gyr=shaken))
+    assert "foot_never_still" in codes(estimate)
+    (notices,) = [f for f in estimate.poses.health if (f.name, f.of) == ("longest_moving_s", "foot_l")]
+    assert notices.verdict == "bad"
 
 
 @pytest.mark.sweep
@@ -114,13 +117,13 @@ def test_a_known_gap_is_bridged_told_and_recovered(lost_s: float) -> None:
         "gyr": np.where(gap[:, None], was.gyr[2000], was.gyr),
         "valid": was.valid & ~gap,
     }
-    made = estimated(changed(take(), "shank_r", **held))
-    assert ("gap_bridged" in codes(made)) == (lost_s > 0.5)
-    assert max(residuals(made).values()) < 30.0
+    estimate = estimated(changed(take(), "shank_r", **held))
+    assert ("gap_bridged" in codes(estimate)) == (lost_s > 0.5)
+    assert max(residuals(estimate).values()) < 30.0
     whole = estimated(take())
-    after = take().t_s > 32.0
+    final = take().t_s > 32.0
     for segment in ("thigh_r", "shank_r", "foot_r"):
-        apart = made.poses.q[segment][after] - whole.poses.q[segment][after]
+        apart = estimate.poses.q[segment][final] - whole.poses.q[segment][final]
         assert np.abs(apart).max() < 0.1
 
 
@@ -132,24 +135,24 @@ def test_an_unnoticed_gap_never_gives_numbers_that_are_none() -> None:
         "acc": np.where(gap[:, None], was.acc[2000], was.acc),
         "gyr": np.where(gap[:, None], was.gyr[2000], was.gyr),
     }
-    made = estimated(changed(take(), "foot_r", **held))
-    for p in made.poses.p.values():
+    estimate = estimated(changed(take(), "foot_r", **held))
+    for p in estimate.poses.p.values():
         assert np.isfinite(p).all()
-    end = made.poses.p["pelvis"][-1] - estimated(take()).poses.p["pelvis"][-1]
+    end = estimate.poses.p["pelvis"][-1] - estimated(take()).poses.p["pelvis"][-1]
     assert np.linalg.norm(end) < 10.0
 
 
 @pytest.mark.slow
 def test_a_burst_of_no_numbers_is_a_gap() -> None:
-    made = simulate_scenario("fast_with_turns", 3)
-    device = next(d for d, s in made.recording.segments.items() if s == "shank_l")
-    stream = made.recording.streams[device]
+    simulation = simulate_scenario("fast_with_turns", 3)
+    device = next(d for d, s in simulation.recording.segments.items() if s == "shank_l")
+    stream = simulation.recording.streams[device]
     acc, gyr = stream.acc.copy(), stream.gyr.copy() if stream.gyr is not None else None
     assert gyr is not None
     acc[2000:2040], gyr[2000:2040] = np.nan, np.nan
     broken: Recording = replace(
-        made.recording,
-        streams={**made.recording.streams, device: replace(stream, acc=acc, gyr=gyr)},
+        simulation.recording,
+        streams={**simulation.recording.streams, device: replace(stream, acc=acc, gyr=gyr)},
     )
     done: TakeAnalysis = analyse(broken)
     assert done.problem is None
@@ -164,8 +167,8 @@ def test_a_burst_of_no_numbers_is_a_gap() -> None:
 def test_a_foot_sensor_put_on_backwards_walks_all_the_same_or_is_told() -> None:
     was = take().sensors["foot_l"]
     half = about(2, np.pi)
-    made = estimated(changed(take(), "foot_l", acc=rotate(half, was.acc), gyr=rotate(half, was.gyr)))
+    estimate = estimated(changed(take(), "foot_l", acc=rotate(half, was.acc), gyr=rotate(half, was.gyr)))
     whole = estimated(take())
-    if not codes(made) & {"sensors_do_not_hang_together", "heading_corrected"}:
-        apart = made.poses.q[FOOT["left"]] - whole.poses.q[FOOT["left"]]
+    if not codes(estimate) & {"sensors_do_not_hang_together", "heading_corrected"}:
+        apart = estimate.poses.q[FOOT["left"]] - whole.poses.q[FOOT["left"]]
         assert np.abs(apart).max() < 0.1

@@ -99,9 +99,9 @@ def test_the_figure_stands_on_the_floor() -> None:
 def test_a_foot_on_the_floor_does_not_slide() -> None:
     poses, truth = figure()
     for side in SIDES:
-        alone = poses.contact[FOOT[side]] & truth.flat[side] & ~poses.contact[FOOT[_other(side)]]
+        single = poses.contact[FOOT[side]] & truth.flat[side] & ~poses.contact[FOOT[_other(side)]]
         v = np.linalg.norm(np.diff(poses.p[FOOT[side]][:, :2], axis=0), axis=1) * truth.rate_hz
-        assert np.median(v[alone[1:]]) < 0.05
+        assert np.median(v[single[1:]]) < 0.05
 
 
 def _other(side: Side) -> Side:
@@ -129,8 +129,8 @@ def test_from_sensors_to_a_figure_on_a_simulated_walk() -> None:
 
 def test_a_missing_segment_leaves_its_leg_out_with_a_reason() -> None:
     recording, _ = simulated("comfortable")
-    kept = only(recording, "pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "foot_r")
-    poses = forward_kinematics(estimate_orientations(calibrate(kept)), BODY)
+    retained = only(recording, "pelvis", "thigh_l", "shank_l", "foot_l", "thigh_r", "foot_r")
+    poses = forward_kinematics(estimate_orientations(calibrate(retained)), BODY)
     assert set(poses.p) == {"pelvis", "thigh_l", "shank_l", "foot_l"}
     assert [n.code for n in poses.notices] == ["figure_incomplete"]
     assert "shank_r" in poses.notices[0].message

@@ -35,5 +35,5 @@ def test_every_live_estimator_has_what_the_chain_asks_for(estimator: type) -> No
         assert hasattr(estimator, name) or f"self.{name}" in source, name
     assert isinstance(inspect.getattr_static(estimator, "broken"), property)
     for name in ("push", "drain_notices"):
-        wanted = inspect.signature(getattr(LivePoseEstimator, name))
-        assert list(inspect.signature(getattr(estimator, name)).parameters) == list(wanted.parameters)
+        expected = inspect.signature(getattr(LivePoseEstimator, name))
+        assert list(inspect.signature(getattr(estimator, name)).parameters) == list(expected.parameters)

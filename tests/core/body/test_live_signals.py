@@ -18,7 +18,7 @@ TREE = person_tree(BodyModel.from_height(1.7), {s: np.eye(3) for s in SEGMENTS},
 
 
 def moving(n: int = 900, seed: int = 3) -> tuple[Floats, Floats]:
-    """Signals of seven sensors that stand for a second and then swing."""
+    """Signals of seven sensors: one second still, then swinging."""
     rng = np.random.default_rng(seed)
     t = np.arange(n)[:, None, None] / RATE
     phase = rng.uniform(0.0, 6.0, (1, 7, 3))

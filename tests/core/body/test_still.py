@@ -1,4 +1,4 @@
-"""Where a foot stands still, and the quietest moment of a stance in which it never does."""
+"""Still periods of a foot, and the quietest moment of a stance without one."""
 
 from __future__ import annotations
 

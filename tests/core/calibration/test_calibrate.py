@@ -36,13 +36,13 @@ def codes(calibration: Calibration) -> set[str]:
 def test_forward_is_found_on_every_segment(name: str) -> None:
     """Against the truth's axes, which at standing are turned out: feet by 10°, legs by a little."""
     recording, truth = simulated(name)
-    found = calibrate(recording).calibration
-    assert abs(axial_error_deg(found, truth, "pelvis")) <= 6.0
+    result = calibrate(recording).calibration
+    assert abs(axial_error_deg(result, truth, "pelvis")) <= 6.0
     for segment in LEGS:
         out = {"foot": 10.0, "shank": 5.0, "thigh": 4.0}[segment.split("_")[0]]
-        outward = axial_error_deg(found, truth, segment) * (1 if segment.endswith("_l") else -1)
+        outward = axial_error_deg(result, truth, segment) * (1 if segment.endswith("_l") else -1)
         assert abs(outward - out) <= 8.0, f"{segment}: {outward:.1f}"
-        assert found.segments[segment].score > 0.8
+        assert result.segments[segment].score > 0.8
 
 
 def test_gyro_bias_is_the_drawn_one() -> None:
@@ -58,11 +58,11 @@ def test_any_mounting_gives_the_same_segment_frames(method: Method) -> None:
     """The same signals in turned sensors: R_segment_sensor takes the turn up."""
     recording, _ = simulated("comfortable")
     rng = np.random.default_rng(7)
-    by: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
+    by_segment: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
     params = replace(CalibrationParams(), method=method)
-    one, other = calibrate(recording, params), calibrate(turned(recording, by), params)
+    one, second = calibrate(recording, params), calibrate(turned(recording, by_segment), params)
     for s in recording.sensors:
-        R = other.calibration.segments[s].R_segment_sensor @ to_matrix(by[s])
+        R = second.calibration.segments[s].R_segment_sensor @ to_matrix(by_segment[s])
         off = log(from_matrix(R @ one.calibration.segments[s].R_segment_sensor.T))
         assert np.degrees(np.linalg.norm(off)) < 0.1, s
 
@@ -70,10 +70,12 @@ def test_any_mounting_gives_the_same_segment_frames(method: Method) -> None:
 def test_half_a_turn_about_the_vertical_is_recognised() -> None:
     recording, _ = simulated("comfortable")
     up = recording.sensors["shank_l"].acc[100:400].mean(axis=0)
-    by: dict[Segment, Floats] = {"shank_l": exp(np.pi * up / np.linalg.norm(up))}
+    by_segment: dict[Segment, Floats] = {"shank_l": exp(np.pi * up / np.linalg.norm(up))}
     one = calibrate(recording).calibration.segments["shank_l"].R_segment_sensor
-    other = calibrate(turned(recording, by)).calibration.segments["shank_l"].R_segment_sensor
-    np.testing.assert_allclose(other @ to_matrix(by["shank_l"]), one, atol=1e-6)
+    other_R_segment_sensor = (
+        calibrate(turned(recording, by_segment)).calibration.segments["shank_l"].R_segment_sensor
+    )
+    np.testing.assert_allclose(other_R_segment_sensor @ to_matrix(by_segment["shank_l"]), one, atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -82,11 +84,11 @@ def test_half_a_turn_about_the_vertical_is_recognised() -> None:
 )
 def test_any_subset_of_segments_works(segments: tuple[Segment, ...]) -> None:
     recording, truth = simulated("comfortable")
-    found = calibrate(only(recording, *segments)).calibration
-    assert set(found.segments) == set(segments)
+    result = calibrate(only(recording, *segments)).calibration
+    assert set(result.segments) == set(segments)
     for s in segments:
-        assert abs(axial_error_deg(found, truth, s)) < 20.0
-    assert len(found.walking) >= 1
+        assert abs(axial_error_deg(result, truth, s)) < 20.0
+    assert len(result.walking) >= 1
 
 
 @pytest.mark.slow
@@ -94,11 +96,11 @@ def test_rest_only_at_the_end_works() -> None:
     """As on gaitmap_foot: the take starts in the middle of the walk."""
     recording, truth = scripted((Stand(3.0), Straight(14.4, 0.45, 0.68), *TOGETHER, Stand(5.0)))
     late = cut(recording, truth.stands[-1][0] - 12.0, recording.t_s[-1])
-    found = calibrate(late).calibration
-    assert len(found.rest) == 1
-    assert found.zero[0] > 11.0
+    result = calibrate(late).calibration
+    assert len(result.rest) == 1
+    assert result.zero[0] > 11.0
     for s in ("pelvis", *LEGS):
-        assert abs(axial_error_deg(found, truth, s)) < 20.0, s
+        assert abs(axial_error_deg(result, truth, s)) < 20.0, s
 
 
 def test_turning_before_walking_does_not_turn_the_segments() -> None:
@@ -106,23 +108,23 @@ def test_turning_before_walking_does_not_turn_the_segments() -> None:
     recording, truth = scripted(
         (Stand(5.0), Pivot(np.pi / 2, np.pi / 4, 0.55), Straight(12.0, 0.64, 0.54), Stand(4.0))
     )
-    found = calibrate(recording).calibration
-    (told,) = (n.message for n in found.notices if n.code == "facing_not_walking")
-    assert "between standing and walking" in told
+    result = calibrate(recording).calibration
+    (notices,) = (n.message for n in result.notices if n.code == "facing_not_walking")
+    assert "between standing and walking" in notices
     for s in ("pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r"):
-        assert abs(axial_error_deg(found, truth, s)) < 20.0, s
+        assert abs(axial_error_deg(result, truth, s)) < 20.0, s
 
 
 def test_turning_after_walking_is_told_as_such() -> None:
-    """As on gaitmap_foot, where the only standing is after a turn at the end: nobody started from it."""
+    """As on gaitmap_foot, where the only standing follows a turn at the end."""
     recording, truth = scripted(
         (Stand(5.0), Straight(12.0, 0.64, 0.54), Pivot(np.pi / 2, np.pi / 4, 0.55), *TOGETHER, Stand(5.0))
     )
-    found = calibrate(cut(recording, truth.stands[0][1] + 1.0, recording.t_s[-1])).calibration
-    assert found.posture == "standing"
-    (told,) = (n.message for n in found.notices if n.code == "facing_not_walking")
-    assert "between walking and standing" in told
-    assert "Start" not in told
+    result = calibrate(cut(recording, truth.stands[0][1] + 1.0, recording.t_s[-1])).calibration
+    assert result.posture == "standing"
+    (notices,) = (n.message for n in result.notices if n.code == "facing_not_walking")
+    assert "between walking and standing" in notices
+    assert "Start" not in notices
 
 
 @pytest.mark.slow
@@ -130,18 +132,18 @@ def test_turning_after_walking_is_told_as_such() -> None:
 def test_a_walk_that_begins_with_an_arc_still_tells_where_the_pelvis_faces(seed: int) -> None:
     script = (Stand(5.0), Arc(1.5, np.pi / 2, 0.52, 0.56), Straight(12.0, 0.64, 0.54), Stand(4.0))
     recording, truth = scripted(script, seed)
-    found = calibrate(cut(recording, 0.0, truth.stands[-1][0] - 0.5)).calibration
-    assert abs(axial_error_deg(found, truth, "pelvis")) <= 20.0
+    result = calibrate(cut(recording, 0.0, truth.stands[-1][0] - 0.5)).calibration
+    assert abs(axial_error_deg(result, truth, "pelvis")) <= 20.0
 
 
 @pytest.mark.slow
 def test_turns_are_not_straight_walking() -> None:
     recording, _ = simulated("fast_with_turns")
-    found = calibrate(recording).calibration
-    assert len(found.walking) >= 4
-    assert 0.05 < found.turning.mean() < 0.5
-    for a, b in found.walking:
-        assert not found.turning[round(a * 100) : round(b * 100)].any()
+    result = calibrate(recording).calibration
+    assert len(result.walking) >= 4
+    assert 0.05 < result.turning.mean() < 0.5
+    for a, b in result.walking:
+        assert not result.turning[round(a * 100) : round(b * 100)].any()
 
 
 def standing_only() -> UniformRecording:
@@ -157,13 +159,13 @@ def test_no_walking_is_an_error_that_says_what_to_do() -> None:
 
 def test_without_walking_a_declared_mounting_is_enough() -> None:
     _, truth = simulated("comfortable")
-    alone = only(standing_only(), "pelvis")
+    single = only(standing_only(), "pelvis")
     face = rotate(truth.mounts["pelvis"].q_segment_sensor, np.array([0.0, 0.0, 1.0]))
     along = {"forward": face[0], "back": -face[0], "right": face[2], "left": -face[2]}
     way = max(along, key=lambda w: along[w])
-    found = calibrate(replace(alone, mounting={"pelvis": f"sacrum, face {way}"})).calibration
-    assert found.segments["pelvis"].method == "declared"
-    assert abs(axial_error_deg(found, truth, "pelvis")) < 50.0
+    result = calibrate(replace(single, mounting={"pelvis": f"sacrum, face {way}"})).calibration
+    assert result.segments["pelvis"].method == "declared"
+    assert abs(axial_error_deg(result, truth, "pelvis")) < 50.0
 
 
 def test_a_mounting_declared_the_wrong_way_round_leaves_the_sensor_out() -> None:
@@ -172,17 +174,17 @@ def test_a_mounting_declared_the_wrong_way_round_leaves_the_sensor_out() -> None
     along = {"forward": face[0], "back": -face[0], "right": face[2], "left": -face[2]}
     wrong = min(along, key=lambda w: along[w])
     contradicted = replace(recording, mounting={"pelvis": f"face {wrong}"})
-    found = calibrate(contradicted).calibration
-    assert [n.sensor for n in found.notices if n.code == "calibration_sign_conflict"] == ["pelvis"]
-    assert set(found.segments) == set(recording.sensors) - {"pelvis"}
-    with pytest.raises(CalibrationError) as alone:
+    result = calibrate(contradicted).calibration
+    assert [n.sensor for n in result.notices if n.code == "calibration_sign_conflict"] == ["pelvis"]
+    assert set(result.segments) == set(recording.sensors) - {"pelvis"}
+    with pytest.raises(CalibrationError) as single_error:
         calibrate(only(contradicted, "pelvis"))
-    assert alone.value.code == "calibration_sign_conflict"
+    assert single_error.value.code == "calibration_sign_conflict"
 
 
 @pytest.mark.slow
 def test_a_pelvis_without_a_rest_near_the_walk_is_left_out_and_the_legs_stay() -> None:
-    """Rest, then 8 s of fidgeting on the spot, then the walk: nothing tells where the pelvis faces."""
+    """Rest, then 8 s of fidgeting, then the walk: the pelvis direction is undetermined."""
     recording, _ = simulated("slow")
     order = np.concatenate((np.arange(100, 500), np.tile(np.arange(100, 500), 2), np.arange(530, 1800)))
     fidget = np.zeros((len(order), 3))
@@ -199,9 +201,9 @@ def test_a_pelvis_without_a_rest_near_the_walk_is_left_out_and_the_legs_stay() -
         for s, x in recording.sensors.items()
     }
     restless = replace(recording, t_s=np.arange(len(order)) / recording.rate_hz, sensors=sensors)
-    found = calibrate(restless).calibration
-    assert "pelvis_heading_unknown" in codes(found)
-    assert set(found.segments) == set(recording.sensors) - {"pelvis"}
+    result = calibrate(restless).calibration
+    assert "pelvis_heading_unknown" in codes(result)
+    assert set(result.segments) == set(recording.sensors) - {"pelvis"}
 
 
 def test_neither_rest_nor_enough_of_a_walk_and_no_sensor_are_errors() -> None:
@@ -223,9 +225,9 @@ def test_few_steps_are_told_with_their_number() -> None:
 
 
 def test_all_segments_have_a_calibration_that_is_a_rotation() -> None:
-    found = calibrate(simulated("comfortable")[0]).calibration
-    assert set(found.segments) <= set(SEGMENTS)
-    for mounted in found.segments.values():
+    result = calibrate(simulated("comfortable")[0]).calibration
+    assert set(result.segments) <= set(SEGMENTS)
+    for mounted in result.segments.values():
         np.testing.assert_allclose(
             mounted.R_segment_sensor @ mounted.R_segment_sensor.T, np.eye(3), atol=1e-9
         )

@@ -1,4 +1,4 @@
-"""Declared mountings that the walk contradicts: which are found, and what is said instead."""
+"""Declared placements contradicted by the walk: detection and proposals."""
 
 from __future__ import annotations
 
@@ -38,34 +38,34 @@ def right_words(truth: WalkTruth, segment: Segment) -> tuple[str, Way, float]:
     return f"strap, {best[1]} {best[2]}", best[2], best[0]
 
 
-def turn_words(text: str, way: Way, by: int) -> str:
+def turn_words(text: str, way: Way, key: int) -> str:
     ways: tuple[Way, ...] = get_args(Way)
-    return say_other_way(text, ways[(ways.index(way) + by) % 4])
+    return say_other_way(text, ways[(ways.index(way) + key) % 4])
 
 
-def declare(take: UniformRecording, truth: WalkTruth, by: int) -> UniformRecording:
+def declare(take: UniformRecording, truth: WalkTruth, key: int) -> UniformRecording:
     """Every mounting declared, `by` quarter turns wrong."""
-    said: dict[str, str] = {}
+    message: dict[str, str] = {}
     for segment in take.sensors:
         text, way, _ = right_words(truth, segment)
-        said[segment] = turn_words(text, way, by)
-    return replace(take, mounting=said)
+        message[segment] = turn_words(text, way, key)
+    return replace(take, mounting=message)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("by", [1, 2, 3])
 def test_a_declaration_turned_by_quarters_is_put_right(by: int) -> None:
     take, truth = simulated("comfortable", 3)
-    found = propose_mountings(declare(take, truth, by))
-    assert found is not None
-    assert not found.is_sure
+    mountings = propose_mountings(declare(take, truth, by))
+    assert mountings is not None
+    assert not mountings.is_sure
     right = {s: right_words(truth, s) for s in take.sensors}
     # whose axis lies between two ways is left alone
     clear = {s for s in LEGS if right[s][2] > NEAR}
     assert len(clear) >= 3
-    assert clear <= set(found.mounting)
-    assert dict(found.mounting) == {s: x[0] for s, x in right.items() if s in found.mounting}
-    assert propose_mountings(replace(take, mounting=dict(found.mounting))) is None
+    assert clear <= set(mountings.mounting)
+    assert dict(mountings.mounting) == {s: x[0] for s, x in right.items() if s in mountings.mounting}
+    assert propose_mountings(replace(take, mounting=dict(mountings.mounting))) is None
 
 
 def test_right_declarations_and_none_are_left_alone() -> None:
@@ -86,8 +86,8 @@ def test_without_a_walk_nothing_is_said() -> None:
 def test_a_manifest_keeps_its_other_words() -> None:
     repair = SetupRepair("mounting", ("said",), np.inf, mounting={"foot_l": "x forward"})
     assert repair.can_be_applied
-    before = {"mounting": {"Left foot": "x back", "pelvis": "sacrum, face backwards"}, "protocol": "walk"}
-    assert repair.complete_manifest(before) == {
+    initial = {"mounting": {"Left foot": "x back", "pelvis": "sacrum, face backwards"}, "protocol": "walk"}
+    assert repair.complete_manifest(initial) == {
         "mounting": {"pelvis": "sacrum, face backwards", "foot_l": "x forward"},
         "protocol": "walk",
     }

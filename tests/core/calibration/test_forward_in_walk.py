@@ -1,4 +1,4 @@
-"""Parts of the forward axis without standing; what it gives on walks is looked at in test_from_walking."""
+"""Parts of the anterior axis without standing; walks are tested in test_from_walking."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from sagittal.core.calibration.forward_in_walk import _in_order, _push, mask_of
 
 
 def test_sensors_that_tell_their_sign_by_themselves_come_first() -> None:
-    worn = dict.fromkeys(("pelvis", "thigh_l", "foot_r", "shank_l"))
-    assert list(_in_order(worn)) == ["shank_l", "foot_r", "thigh_l", "pelvis"]  # type: ignore[arg-type]
+    fromkeys = dict.fromkeys(("pelvis", "thigh_l", "foot_r", "shank_l"))
+    assert list(_in_order(fromkeys)) == ["shank_l", "foot_r", "thigh_l", "pelvis"]  # type: ignore[arg-type]
 
 
 def test_samples_of_the_parts_are_marked() -> None:

@@ -32,18 +32,18 @@ def legs() -> UniformRecording:
 
 @pytest.mark.slow
 def test_the_walk_gives_what_standing_gives_but_for_the_neutral_posture(legs: UniformRecording) -> None:
-    found = calibrate(legs).calibration
+    calibration = calibrate(legs).calibration
     whole = calibrate(simulated()[0]).calibration
-    assert found.posture == "walking"
-    assert found.rest == ()
-    assert set(found.segments) == set(LEGS)
+    assert calibration.posture == "walking"
+    assert calibration.rest == ()
+    assert set(calibration.segments) == set(LEGS)
     for s in LEGS:
-        off = np.degrees(found.segments[s].gyro_bias - whole.segments[s].gyro_bias)
-        up = found.segments[s].R_segment_sensor[1]
+        off = np.degrees(calibration.segments[s].gyro_bias - whole.segments[s].gyro_bias)
+        up = calibration.segments[s].R_segment_sensor[1]
         assert np.linalg.norm(off - (off @ up) * up) < 0.5, s
         # about the vertical nothing but straight walking tells
         assert abs(off @ up) < 1.5, s
-        assert found.segments[s].rest_norm == pytest.approx(whole.segments[s].rest_norm, abs=0.2)
+        assert calibration.segments[s].rest_norm == pytest.approx(whole.segments[s].rest_norm, abs=0.2)
 
 
 @pytest.mark.slow
@@ -67,44 +67,44 @@ def test_segments_are_where_they_are_but_for_a_fixed_turn(name: str) -> None:
 
 @pytest.mark.slow
 def test_the_foot_is_flat_where_it_is_flat_in_standing(legs: UniformRecording) -> None:
-    found, whole = calibrate(legs).calibration, calibrate(simulated()[0]).calibration
+    calibration, whole = calibrate(legs).calibration, calibrate(simulated()[0]).calibration
     feet: tuple[Segment, ...] = ("foot_l", "foot_r")
     for s in feet:
-        a, b = (c.segments[s].R_segment_sensor[1] for c in (found, whole))
+        a, b = (c.segments[s].R_segment_sensor[1] for c in (calibration, whole))
         assert np.degrees(np.arccos(a @ b)) < 3.0
 
 
 def test_any_mounting_gives_the_same_posture(legs: UniformRecording) -> None:
     rng = np.random.default_rng(3)
-    by: dict[Segment, Floats] = {s: exp(rng.normal(0.0, 1.5, 3)) for s in LEGS}
-    q, other = (estimate_orientations(calibrate(r)).q for r in (legs, turned(legs, by)))
+    by_segment: dict[Segment, Floats] = {s: exp(rng.normal(0.0, 1.5, 3)) for s in LEGS}
+    q, second = (estimate_orientations(calibrate(r)).q for r in (legs, turned(legs, by_segment)))
     for s in LEGS:
         # headings are means of a twist, which another mounting sees a little otherwise
-        assert np.degrees(np.median(angle_between(q[s], other[s]))) < 4.0
+        assert np.degrees(np.median(angle_between(q[s], second[s]))) < 4.0
 
 
 def test_all_segments_walk_ahead(legs: UniformRecording) -> None:
-    made = calibrate(legs)
-    q = estimate_orientations(made).q
-    a, b = (round(t * legs.rate_hz) for t in made.calibration.zero)
+    result = calibrate(legs)
+    q = estimate_orientations(result).q
+    a, b = (round(t * legs.rate_hz) for t in result.calibration.zero)
     for s in LEGS:
         heading = np.angle(np.mean(np.exp(1j * yaw(q[s][a:b]))))
         assert abs(np.degrees(wrap_angle(float(heading)))) < 5.0, s
 
 
 def test_a_thigh_alone_does_not_know_forward_and_a_declared_one_does() -> None:
-    alone = only(mid_walk(), "thigh_r")
+    single = only(mid_walk(), "thigh_r")
     with pytest.raises(CalibrationError) as caught:
-        calibrate(alone)
+        calibrate(single)
     assert caught.value.code == "forward_unknown"
-    known = replace(alone, mounting={"thigh_r": "face right"})
-    assert calibrate(known).calibration.segments["thigh_r"].method == "walking_direction"
+    known_variant = replace(single, mounting={"thigh_r": "face right"})
+    assert calibrate(known_variant).calibration.segments["thigh_r"].method == "walking_direction"
 
 
 def test_a_pelvis_that_does_not_vault_is_left_out_and_said() -> None:
-    found = calibrate(mid_walk()).calibration
-    assert "pelvis" not in found.segments
-    assert {n.code for n in found.notices} >= {"pelvis_heading_unknown", "from_walking"}
+    calibration = calibrate(mid_walk()).calibration
+    assert "pelvis" not in calibration.segments
+    assert {n.code for n in calibration.notices} >= {"pelvis_heading_unknown", "from_walking"}
     sure = CalibrationParams(heading=HeadingParams(pendulum=0.0))
     assert "pelvis" in calibrate(mid_walk(), sure).calibration.segments
 

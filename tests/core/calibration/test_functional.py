@@ -33,8 +33,8 @@ LEGS = tuple(s for s in SEGMENTS if s not in ("pelvis", "chest"))
 
 @cache
 def take(seed: int = 0, does: SwingsAndBows | None = None) -> tuple[UniformRecording, FunctionalTruth]:
-    made = simulate_swings_and_bows(does, seed=seed, setup=RecordingSetup())
-    return synchronise(made.recording), made.truth
+    swings_and_bows = simulate_swings_and_bows(does, seed=seed, setup=RecordingSetup())
+    return synchronise(swings_and_bows.recording), swings_and_bows.truth
 
 
 def find_errors(calibrated: CalibratedRecording, truth: FunctionalTruth) -> dict[Segment, float]:
@@ -54,18 +54,22 @@ def test_random_mountings_come_out_within_two_degrees(seed: int) -> None:
     errors = find_errors(calibrated, truth)
     assert set(errors) == set(truth.mounts)
     assert max(errors.values()) < 2.0, errors
-    found = calibrated.calibration
-    assert {found.segments[s].method for s in LEGS} == {"hip_swing"}
-    assert found.segments["pelvis"].method == "trunk_bow"
-    assert found.walking == ()
-    assert found.notices == ()
+    calibration = calibrated.calibration
+    assert {calibration.segments[s].method for s in LEGS} == {"hip_swing"}
+    assert calibration.segments["pelvis"].method == "trunk_bow"
+    assert calibration.walking == ()
+    assert calibration.notices == ()
 
 
 @pytest.mark.slow
 def test_windows_and_repetitions_are_those_that_were_done() -> None:
     recording, truth = take()
-    found = find_functional_movements(recording, FunctionalParams())
-    masks = {"swing_left": found.swings["left"], "swing_right": found.swings["right"], "bow": found.bows}
+    functional_movements = find_functional_movements(recording, FunctionalParams())
+    masks = {
+        "swing_left": functional_movements.swings["left"],
+        "swing_right": functional_movements.swings["right"],
+        "bow": functional_movements.bows,
+    }
     for kind, mask in masks.items():
         (phase,) = [p for p in truth.phases if p.kind == kind]
         ((a, b),) = find_runs(mask)
@@ -96,8 +100,8 @@ def test_few_repetitions_are_used_and_told() -> None:
     recording, truth = take(4, SwingsAndBows(swings=7, bows=5))
     calibrated = calibrate(recording)
     assert max(find_errors(calibrated, truth).values()) < 2.0
-    told = [n for n in calibrated.calibration.notices if n.code == "few_repetitions"]
-    assert {n.sensor for n in told} == set(LEGS)
+    notices = [n for n in calibrated.calibration.notices if n.code == "few_repetitions"]
+    assert {n.sensor for n in notices} == set(LEGS)
     checks = score_calibration(calibrated).checks
     redo = {c.segment for c in checks if c.name == "repetitions" and c.verdict == "redo"}
     assert redo == set(LEGS)
@@ -107,12 +111,12 @@ def test_few_repetitions_are_used_and_told() -> None:
 def test_equal_swings_forward_and_back_have_a_weak_sign() -> None:
     does = SwingsAndBows(forward_rad=radians(20.0), backward_rad=radians(20.0), knee_rad=0.0, bows=0)
     recording, _ = take(5, does)
-    told = {n.code for n in calibrate(recording).calibration.notices}
-    assert "calibration_sign_weak" in told
+    codes = {n.code for n in calibrate(recording).calibration.notices}
+    assert "calibration_sign_weak" in codes
 
 
 def test_swings_that_go_aside_each_time_bend_the_axis_by_as_much() -> None:
-    """No axis of a single movement can tell that from a mounting that is turned."""
+    """A single movement cannot be distinguished from a rotated sensor."""
     does = SwingsAndBows(aside_rad=radians(4.0), aside_per_swing=1.0, bows=0)
     recording, truth = take(6, does)
     worst = max(find_errors(calibrate(recording), truth).values())
@@ -136,16 +140,16 @@ def test_labels_hold_and_the_angles_of_swings_come_out() -> None:
 def test_live_it_is_the_same_calibration() -> None:
     whole, truth = take(0, SwingsAndBows(swings=10, bows=5))
     recording = only(whole, "pelvis", "shank_l", "shank_r")
-    worn = WornSensors(tuple(recording.sensors), recording.rate_hz, recording.subject, "walk", {})
-    live = LiveCalibrator(worn)
-    found, told = [], set()
+    segments = WornSensors(tuple(recording.sensors), recording.rate_hz, recording.subject, "walk", {})
+    live = LiveCalibrator(segments)
+    results, names = [], set()
     for block in cut_blocks(recording):
-        found.append(live.push(block))
-        told.add(live.view.problem)
-    (made,) = [x for x in found if x is not None]
-    assert told == {None}
-    assert {c.method for c in made.checks} == {"hip_swing", "trunk_bow"}
-    assert max(find_errors(made.calibrated, truth).values()) < 2.0
+        results.append(live.push(block))
+        names.add(live.view.problem)
+    (result,) = [x for x in results if x is not None]
+    assert names == {None}
+    assert {c.method for c in result.checks} == {"hip_swing", "trunk_bow"}
+    assert max(find_errors(result.calibrated, truth).values()) < 2.0
 
 
 def test_impossible_movements_are_refused() -> None:

@@ -33,11 +33,11 @@ def test_any_mounting_is_found_within_the_oracle() -> None:
         rate, force = flexing(truth.T, seed=k)
         up = force.mean(axis=0)
         R_vertical = vertical_frame(up / np.linalg.norm(up))
-        found = flexion_axis(rate, R_vertical, "shank_l")
-        R = about_vertical(found.gamma) @ R_vertical
-        both = [R, about_vertical(np.pi) @ R]
-        off.append(min(float(np.linalg.norm(log(from_matrix(x @ truth.T)))) for x in both))
-        assert found.rho > 0.98
+        result = flexion_axis(rate, R_vertical, "shank_l")
+        R = about_vertical(result.gamma) @ R_vertical
+        pair = [R, about_vertical(np.pi) @ R]
+        off.append(min(float(np.linalg.norm(log(from_matrix(x @ truth.T)))) for x in pair))
+        assert result.rho > 0.98
     assert np.degrees(np.median(off)) < 0.06
     assert np.degrees(max(off)) < 0.2
 
@@ -80,16 +80,15 @@ def test_gait_margin_wants_thigh_forward_and_the_others_back(segment: str, sign:
 def test_motion_aside_bends_the_axis_by_its_correlation_and_the_share_hardly_tells(
     aside: float, together: float
 ) -> None:
-    """The principal axis lies ½ atan(2cσ / (1 − σ²)) off, σ and c of the motion aside: inherent, and ρ is a
-    weak alarm."""
+    """The principal axis deviates by ½ atan(2cσ / (1 − σ²)), σ and c of the lateral motion."""
     rng = np.random.default_rng(2)
     z = rng.standard_normal(40_000)
     x = aside * (together * z + np.sqrt(1 - together**2) * rng.standard_normal(len(z)))
-    found = flexion_axis(np.column_stack([x, 0.3 * rng.standard_normal(len(z)), z]), np.eye(3), "shank_l")
+    result = flexion_axis(np.column_stack([x, 0.3 * rng.standard_normal(len(z)), z]), np.eye(3), "shank_l")
     bend = 0.5 * np.arctan2(2 * together * aside, 1 - aside**2)
-    off = (found.gamma + bend + np.pi / 2) % np.pi - np.pi / 2
+    off = (result.gamma + bend + np.pi / 2) % np.pi - np.pi / 2
     assert abs(np.degrees(off)) < 1.0 if aside < 0.5 else abs(np.degrees(off)) < 2.5
-    assert found.rho > (0.9 if aside < 0.5 else 0.6)
+    assert result.rho > (0.9 if aside < 0.5 else 0.6)
 
 
 @pytest.mark.parametrize("segment", ["thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r"])
@@ -104,9 +103,9 @@ def test_the_sign_of_a_gait_is_right_in_every_mounting(segment: Segment, amplitu
     everywhere = np.ones(len(lean), np.bool_)
     for _ in range(60):
         R = to_matrix(normalise(rng.standard_normal(4)))
-        seen = up @ R
+        observations = up @ R
         right, turned = (
-            gait_margin(sagittal_angle(seen, about_vertical(turn) @ R), everywhere, segment)
+            gait_margin(sagittal_angle(observations, about_vertical(turn) @ R), everywhere, segment)
             for turn in (0.0, np.pi)
         )
         assert right > np.radians(5.0)

@@ -31,10 +31,10 @@ def out_and_back(direction: float, bias: complex = 0j) -> np.ndarray:
 @pytest.mark.parametrize("direction", np.linspace(-3.1, 3.1, 7))
 def test_velocity_out_less_back_is_the_direction_in_spite_of_a_bias(direction: float) -> None:
     v = rest_to_rest_velocity(out_and_back(direction, 0.05 - 0.03j), True, RATE)
-    found = velocity_direction(v, 0, [(200, 700), (900, 1400)], [0.0, np.pi], PARAMS)
-    assert found is not None
-    assert abs(subtract_angles(found.angle, direction)) < np.radians(1.0)
-    assert found.score > 0.99
+    result = velocity_direction(v, 0, [(200, 700), (900, 1400)], [0.0, np.pi], PARAMS)
+    assert result is not None
+    assert abs(subtract_angles(result.angle, direction)) < np.radians(1.0)
+    assert result.score > 0.99
 
 
 def test_velocity_that_disagrees_with_itself_gives_no_direction() -> None:
@@ -53,10 +53,10 @@ def test_a_foot_goes_where_each_of_its_strides_goes_in_spite_of_a_bias() -> None
     )
     a = np.gradient(v) * RATE * np.exp(0.6j) + 0.3 - 0.2j
     flats = np.arange(90, len(v), 110)
-    found = stride_direction(a, flats, [(0, 550), (550, 1100)], [0.0, np.pi], RATE, PARAMS)
-    assert found is not None
-    assert abs(subtract_angles(found.angle, 0.6)) < np.radians(1.0)
-    assert found.score > 0.99
+    result = stride_direction(a, flats, [(0, 550), (550, 1100)], [0.0, np.pi], RATE, PARAMS)
+    assert result is not None
+    assert abs(subtract_angles(result.angle, 0.6)) < np.radians(1.0)
+    assert result.score > 0.99
 
 
 @pytest.mark.parametrize("flats", [[], [90], [90, 900]], ids=["none", "one", "too far apart"])
@@ -68,10 +68,10 @@ def test_a_foot_without_strides_has_no_direction(flats: list[int]) -> None:
 @pytest.mark.parametrize("leads", [True, False])
 def test_velocity_next_to_a_rest_tells_the_sign(leads: bool) -> None:
     a = out_and_back(0.7)
-    rest, part, turn = ((0.0, 1.0), (110, 700), 0.0) if leads else ((15.0, 16.0), (900, 1490), np.pi)
-    found = start_direction(a, rest, part, turn, leads, RATE, 1.5, PARAMS)
-    assert found is not None
-    assert abs(subtract_angles(found.angle, 0.7)) < np.radians(2.0)
+    remainder, part, turn = ((0.0, 1.0), (110, 700), 0.0) if leads else ((15.0, 16.0), (900, 1490), np.pi)
+    result = start_direction(a, remainder, part, turn, leads, RATE, 1.5, PARAMS)
+    assert result is not None
+    assert abs(subtract_angles(result.angle, 0.7)) < np.radians(2.0)
 
 
 def test_a_rest_far_from_the_walk_tells_no_sign() -> None:
@@ -82,20 +82,20 @@ def test_a_rest_far_from_the_walk_tells_no_sign() -> None:
 def test_axis_of_a_leg_is_where_it_swings_most(direction: float) -> None:
     t = np.arange(1000) / RATE
     a = (3.0 * np.sin(6 * t) + 1j * np.sin(6 * t + 1.3)) * np.exp(1j * direction)
-    found = acceleration_axis(a, [(0, 1000)], [0.0], RATE, PARAMS)
+    result = acceleration_axis(a, [(0, 1000)], [0.0], RATE, PARAMS)
     turned_part = acceleration_axis(a * np.exp(0.5j), [(0, 1000)], [0.5], RATE, PARAMS)
-    assert abs(subtract_angles(nearest_sign(found.angle, turned_part.angle), turned_part.angle)) < 1e-9
-    assert abs(subtract_angles(nearest_sign(found.angle, direction), direction)) < np.radians(8.0)
+    assert abs(subtract_angles(nearest_sign(result.angle, turned_part.angle), turned_part.angle)) < 1e-9
+    assert abs(subtract_angles(nearest_sign(result.angle, direction), direction)) < np.radians(8.0)
 
 
 def test_sway_of_the_trunk_does_not_turn_the_axis() -> None:
-    """Sway larger than fore-aft, at half its frequency: without the step time the axis lies across."""
+    """Sway larger than fore-aft motion, at half its frequency: without step time the axis is lateral."""
     t = np.arange(2000) / RATE
     step = 0.55
     a = (np.sin(2 * np.pi * t / step) + 2.0j * np.sin(np.pi * t / step)) * np.exp(0.4j)
-    across = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS)
+    lateral = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS)
     along = acceleration_axis(a, [(0, 2000)], [0.0], RATE, PARAMS, [step])
-    assert abs(subtract_angles(nearest_sign(across.angle, 0.4), 0.4)) > np.radians(60.0)
+    assert abs(subtract_angles(nearest_sign(lateral.angle, 0.4), 0.4)) > np.radians(60.0)
     assert abs(subtract_angles(nearest_sign(along.angle, 0.4), 0.4)) < np.radians(1.0)
 
 

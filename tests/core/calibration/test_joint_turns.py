@@ -1,4 +1,4 @@
-"""How the sensors beside a joint are turned against each other, as the joint shows it."""
+"""Heading difference of adjacent sensors from their joint."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ PARAMS = JointTurnParams()
 def take() -> tuple[UniformRecording, dict[Segment, Floats]]:
     """Shank and foot, and sensor to world of each."""
     recording, truth = simulated("comfortable", 1)
-    worn: tuple[Segment, ...] = ("shank_l", "foot_l")
-    return only(recording, *worn), {
-        s: multiply(truth.q[s], truth.mounts[s].q_segment_sensor)[: len(recording.t_s)] for s in worn
+    segments: tuple[Segment, ...] = ("shank_l", "foot_l")
+    return only(recording, *segments), {
+        s: multiply(truth.q[s], truth.mounts[s].q_segment_sensor)[: len(recording.t_s)] for s in segments
     }
 
 
@@ -33,10 +33,10 @@ def measure(
 ) -> list[tuple[float, float]]:
     """Turns found and their sd, degrees, where the world of the foot is turned."""
     recording, q = take()
-    given = {**q, "foot_l": multiply(about(2, np.radians(turned_deg)), q["foot_l"])}
-    found = measure_joint_turns(recording, {s: np.zeros(3) for s in q}, given, parts, PARAMS)
-    assert all((x.proximal, x.distal, x.doubt) == ("shank_l", "foot_l", PARAMS.doubt) for x in found)
-    return [(float(np.degrees(x.turn)), float(np.degrees(x.sd))) for x in found]
+    inputs = {**q, "foot_l": multiply(about(2, np.radians(turned_deg)), q["foot_l"])}
+    joint_turns = measure_joint_turns(recording, {s: np.zeros(3) for s in q}, inputs, parts, PARAMS)
+    assert all((x.proximal, x.distal, x.doubt) == ("shank_l", "foot_l", PARAMS.doubt) for x in joint_turns)
+    return [(float(np.degrees(x.turn)), float(np.degrees(x.sd))) for x in joint_turns]
 
 
 def test_the_turn_between_two_worlds_is_found_with_its_sign() -> None:
@@ -58,7 +58,7 @@ def test_without_enough_walking_a_joint_says_nothing() -> None:
 def test_a_joint_needs_both_sensors_and_signals_that_fit() -> None:
     recording, q = take()
     biases = {s: np.zeros(3) for s in q}
-    alone: dict[Segment, Floats] = {"foot_l": q["foot_l"]}
-    assert measure_joint_turns(recording, biases, alone, [WALK], PARAMS) == []
+    single_by_segment: dict[Segment, Floats] = {"foot_l": q["foot_l"]}
+    assert measure_joint_turns(recording, biases, single_by_segment, [WALK], PARAMS) == []
     strict = JointTurnParams(worst_misfit=0.01)
     assert measure_joint_turns(recording, biases, q, [WALK], strict) == []

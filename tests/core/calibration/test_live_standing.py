@@ -1,4 +1,4 @@
-"""Standing as it is seen from now: who is still, for how long, and which way is up."""
+"""Live standing: moving sensors, duration, vertical."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REST = RestParams()
 
 
 def recording(**moving: Bools) -> UniformRecording:
-    """Ten seconds; each sensor turns where it is said to move."""
+    """Ten seconds; the listed sensors rotate where they move."""
     sensors: dict[Segment, SensorSignals] = {}
     for segment, moves in moving.items():
         gyr = np.zeros((N, 3))
@@ -32,30 +32,30 @@ def until(end_s: float) -> Bools:
 
 
 def test_all_have_stood_since_the_last_one_stopped() -> None:
-    found = judge_standing(recording(foot_l=until(2.0), foot_r=until(5.0)), REST)
-    assert found.still == {"foot_l", "foot_r"}
-    assert found.stood_s == pytest.approx(5.0, abs=0.5)
-    assert found.longest_s == found.stood_s
+    verdict = judge_standing(recording(foot_l=until(2.0), foot_r=until(5.0)), REST)
+    assert verdict.still == {"foot_l", "foot_r"}
+    assert verdict.stood_s == pytest.approx(5.0, abs=0.5)
+    assert verdict.longest_s == verdict.stood_s
 
 
 def test_one_that_moves_now_ends_the_standing_of_all() -> None:
-    found = judge_standing(recording(foot_l=until(0.0), foot_r=~until(7.0)), REST)
-    assert found.still == {"foot_l"}
-    assert found.stood_s == 0.0
-    assert found.longest_s == pytest.approx(7.0, abs=0.5)
+    verdict = judge_standing(recording(foot_l=until(0.0), foot_r=~until(7.0)), REST)
+    assert verdict.still == {"foot_l"}
+    assert verdict.stood_s == 0.0
+    assert verdict.longest_s == pytest.approx(7.0, abs=0.5)
 
 
 def test_a_longer_rest_before_is_told_beside_the_one_that_lasts() -> None:
     middle = np.zeros(N, np.bool_)
     middle[300:350] = True
-    found = judge_standing(recording(foot_l=middle), REST)
-    assert found.longest_s == pytest.approx(6.0, abs=0.5)
-    assert found.stood_s == pytest.approx(3.0, abs=0.5)
+    verdict = judge_standing(recording(foot_l=middle), REST)
+    assert verdict.longest_s == pytest.approx(6.0, abs=0.5)
+    assert verdict.stood_s == pytest.approx(3.0, abs=0.5)
 
 
 def test_nothing_recorded_stands_still_for_no_time() -> None:
-    found = judge_standing(recording(), REST)
-    assert (found.still, found.stood_s, found.longest_s) == (frozenset(), 0.0, 0.0)
+    verdict = judge_standing(recording(), REST)
+    assert (verdict.still, verdict.stood_s, verdict.longest_s) == (frozenset(), 0.0, 0.0)
 
 
 def test_the_last_part_is_cut_in_every_signal() -> None:
@@ -68,13 +68,13 @@ def test_the_last_part_is_cut_in_every_signal() -> None:
 
 
 def test_up_is_the_mean_of_the_last_second() -> None:
-    given = recording(foot_l=until(0.0))
-    acc = given.sensors["foot_l"].acc.copy()
+    inputs = recording(foot_l=until(0.0))
+    acc = inputs.sensors["foot_l"].acc.copy()
     acc[:-50] = (9.0, 0.0, 0.0)
     acc[-50:] = (0.0, 3.0, 4.0)
     turned = SensorSignals("", acc, acc, None, until(20.0), until(0.0))
     nothing = SensorSignals("", np.zeros((N, 3)), acc, None, until(20.0), until(0.0))
-    both = UniformRecording(given.t_s, RATE, {"foot_l": turned, "foot_r": nothing}, Subject(), "walk", {})
-    found = find_upward_axes(both)
-    assert found["foot_l"] == pytest.approx([0.0, 0.6, 0.8])
-    assert not found["foot_r"].any()
+    pair = UniformRecording(inputs.t_s, RATE, {"foot_l": turned, "foot_r": nothing}, Subject(), "walk", {})
+    upward_axes = find_upward_axes(pair)
+    assert upward_axes["foot_l"] == pytest.approx([0.0, 0.6, 0.8])
+    assert not upward_axes["foot_r"].any()

@@ -22,10 +22,10 @@ from sagittal.core.calibration.standing import vertical_frame
     ],
 )
 def test_words_become_a_direction(text: str, axis: tuple[int, int, int], degrees: float) -> None:
-    found = read_declared_direction(text)
-    assert found is not None
-    np.testing.assert_allclose(found[0], axis)
-    assert np.degrees(found[1]) == pytest.approx(degrees)
+    result = read_declared_direction(text)
+    assert result is not None
+    np.testing.assert_allclose(result[0], axis)
+    assert np.degrees(result[1]) == pytest.approx(degrees)
 
 
 @pytest.mark.parametrize("text", ["", "sacrum", "with tape", "surface forwarded by mail"])

@@ -42,18 +42,18 @@ def pause(steps: int, stands_s: float) -> UniformRecording:
 @pytest.mark.sweep
 @pytest.mark.parametrize("name", PATIENTS)
 def test_a_stop_of_a_virtual_person_is_no_standing(name: str) -> None:
-    found = calibrate(within_walk(name)).calibration
-    assert found.posture == "walking"
-    (told,) = (n.message for n in found.notices if n.code == "from_walking")
-    assert "paused in mid-stride" in told
+    calibration = calibrate(within_walk(name)).calibration
+    assert calibration.posture == "walking"
+    (notices,) = (n.message for n in calibration.notices if n.code == "from_walking")
+    assert "paused in mid-stride" in notices
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PATIENTS)
 def test_the_standing_before_a_walk_is_taken(name: str) -> None:
-    found = calibrate(simulated(name)[0]).calibration
-    assert found.posture == "standing"
-    assert found.zero[0] < 6.0
+    calibration = calibrate(simulated(name)[0]).calibration
+    assert calibration.posture == "standing"
+    assert calibration.zero[0] < 6.0
 
 
 @pytest.mark.sweep
@@ -78,16 +78,16 @@ def test_a_stop_with_both_feet_side_by_side_is_a_standing(steps: int) -> None:
     recording, truth = scripted(
         (Stand(4.0), walk, *TOGETHER, Stand(4.0), Straight(8.06, 0.62, 0.55), Stand(3.0))
     )
-    within = cut(recording, truth.stands[0][1] + 1.0, truth.stands[-1][0] - 1.0)
-    assert calibrate(within).calibration.posture == "standing"
+    inside = cut(recording, truth.stands[0][1] + 1.0, truth.stands[-1][0] - 1.0)
+    assert calibrate(inside).calibration.posture == "standing"
 
 
 @pytest.mark.slow
 def test_a_take_of_walking_with_a_pause_states_no_levels_and_no_step_length() -> None:
-    found = analyse(cut_recording(simulate_scenario("healthy", seed=5).recording, 7.3, 29.4))
-    assert found.problem is None
-    assert "from_walking" in {n.code for n in found.notices}
-    figures = {(p.name, p.side): p for p in found.parameters}
+    analysis = analyse(cut_recording(simulate_scenario("healthy", seed=5).recording, 7.3, 29.4))
+    assert analysis.problem is None
+    assert "from_walking" in {n.code for n in analysis.notices}
+    figures = {(p.name, p.side): p for p in analysis.parameters}
     for side in ("left", "right"):
         assert figures["step_length_m", side].mean is None
         assert figures["ankle_dorsiflexion_max_swing_deg", side].reason == "no_standing"
@@ -97,7 +97,7 @@ def test_a_take_of_walking_with_a_pause_states_no_levels_and_no_step_length() ->
 @pytest.mark.sweep
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "14-1"])
 def test_the_standing_of_a_real_walk_is_taken(name: str) -> None:
-    """All but one of `ipol_walks` in which nobody stands still."""
+    """All but one of `ipol_walks`, in which nobody is still."""
     assert analyse(read_take(name)).calibration.posture == "standing"  # type: ignore[union-attr]
 
 
@@ -137,9 +137,9 @@ def test_a_short_rest_within_movement_is_a_pause(
 def test_one_leg_is_ahead_where_thigh_and_shank_say_so(
     tilt_deg: dict[Segment, float], ahead_deg: float
 ) -> None:
-    found = measure_leg_ahead({s: radians(x) for s, x in tilt_deg.items()})
-    assert np.degrees(found) == pytest.approx(ahead_deg, abs=1e-9)
-    assert (found >= LEG_AHEAD) == (ahead_deg > 6.0)
+    leg_ahead = measure_leg_ahead({s: radians(x) for s, x in tilt_deg.items()})
+    assert np.degrees(leg_ahead) == pytest.approx(ahead_deg, abs=1e-9)
+    assert (leg_ahead >= LEG_AHEAD) == (ahead_deg > 6.0)
 
 
 @pytest.mark.slow

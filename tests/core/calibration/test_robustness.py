@@ -35,9 +35,9 @@ def test_any_piece_with_any_sensors_ends_in_a_result_or_a_code(seed: int) -> Non
     recording, _ = simulated(names[seed % len(names)])
     start = float(rng.uniform(0, recording.t_s[-1] - 2.0)) * (rng.random() > 0.3)
     piece = cut(recording, start, start + float(rng.choice([0.1, 1.0, 3.0, 10.0, 20.0, 40.0])))
-    worn = rng.permutation(list(recording.sensors))[: rng.integers(1, 8)]
+    permutation = rng.permutation(list(recording.sensors))[: rng.integers(1, 8)]
     method: Method = "gyro_pca" if rng.random() < 0.3 else "walking_direction"
-    calibrated = _attempt(only(piece, *worn), CalibrationParams(method=method))
+    calibrated = _attempt(only(piece, *permutation), CalibrationParams(method=method))
     if isinstance(calibrated, SagittalError):
         assert calibrated.code in CODES
         assert len(calibrated.message) > 30

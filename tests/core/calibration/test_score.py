@@ -57,9 +57,9 @@ def test_a_clean_walk_passes_and_says_what_it_cannot_judge() -> None:
 
 @pytest.mark.parametrize("degrees", [-15.0, 15.0, 30.0])
 def test_the_knee_shows_a_turned_forward_axis_of_thigh_or_shank(degrees: float) -> None:
-    before = find(score_calibration(clean()), "knee_axis", "thigh_l")
-    assert before.value is not None
-    assert before.value < 5.0
+    initial_matches = find(score_calibration(clean()), "knee_axis", "thigh_l")
+    assert initial_matches.value is not None
+    assert initial_matches.value < 5.0
     score = score_calibration(turn_axis("shank_l", degrees))
     for segment in ("thigh_l", "shank_l"):
         check = find(score, "knee_axis", segment)
@@ -121,8 +121,8 @@ def test_joints_and_their_turns_speak() -> None:
     assert find(score, "joint_misfit", "thigh_l").verdict == "pass"
     assert find(score, "heading_spread", "shank_l").verdict == "redo"
     assert score.verdict == "redo"
-    told = score.to_json()
-    assert told["verdict"] == "redo"
+    notices = score.to_json()
+    assert notices["verdict"] == "redo"
 
 
 def test_a_sensor_without_forward_axis_is_to_be_done_again() -> None:
@@ -154,14 +154,14 @@ def test_a_hinge_is_found_in_both_segments() -> None:
     turn = exp(rng.normal(0.0, 0.5, (800, 1)) * tilted)
     thigh = body
     shank = rotate(about(1, -0.5), rotate(turn, body) + bend[:, None] * tilted)
-    found = find_knee_axes(thigh, shank)
-    assert found.thigh == pytest.approx(0.3, abs=0.01)
-    assert found.shank == pytest.approx(0.3 - 0.5, abs=0.01)
-    assert found.apart == pytest.approx(0.5, abs=0.01)
+    knee_axes = find_knee_axes(thigh, shank)
+    assert knee_axes.thigh == pytest.approx(0.3, abs=0.01)
+    assert knee_axes.shank == pytest.approx(0.3 - 0.5, abs=0.01)
+    assert knee_axes.apart == pytest.approx(0.5, abs=0.01)
 
 
 def test_the_words_are_short_and_each_is_said_once() -> None:
-    said = [text for rule in RULES for text in (rule.means, rule.todo)]
-    assert len(set(said)) == len(said)
-    assert max(len(text.split()) for text in said) <= 25
+    texts = [text for rule in RULES for text in (rule.means, rule.todo)]
+    assert len(set(texts)) == len(texts)
+    assert max(len(text.split()) for text in texts) <= 25
     assert judge_together(()) == "not_judged"

@@ -33,8 +33,8 @@ def sensor(gyr: Floats, acc: Floats | None = None) -> SensorSignals:
 def take(*sensors: SensorSignals) -> UniformRecording:
     names = ("foot_l", "foot_r", "shank_l")
     n = len(sensors[0].acc)
-    worn = dict(zip(names, sensors, strict=False))
-    return UniformRecording(np.arange(n) / RATE, RATE, worn, Subject(), "walk", {})  # type: ignore[arg-type]
+    mapping = dict(zip(names, sensors, strict=False))
+    return UniformRecording(np.arange(n) / RATE, RATE, mapping, Subject(), "walk", {})  # type: ignore[arg-type]
 
 
 def wobble(degrees_per_s: float, n: int = 1000, seed: int = 0) -> Floats:
@@ -60,10 +60,10 @@ def test_sensor_x_along_the_vertical_works() -> None:
 
 def test_standing_gives_up_bias_and_norm() -> None:
     bias = np.radians([1.0, -0.5, 0.2])
-    found = measure_standing(sensor(np.tile(bias, (500, 1))), RATE, (1.0, 4.0), "foot_l")
-    np.testing.assert_allclose(found.up, [0, 1, 0])
-    np.testing.assert_allclose(found.gyro_bias, bias)
-    assert found.rest_norm == pytest.approx(9.81)
+    result = measure_standing(sensor(np.tile(bias, (500, 1))), RATE, (1.0, 4.0), "foot_l")
+    np.testing.assert_allclose(result.up, [0, 1, 0])
+    np.testing.assert_allclose(result.gyro_bias, bias)
+    assert result.rest_norm == pytest.approx(9.81)
 
 
 @pytest.mark.parametrize("norm", [0.02, 1.0, 98.1])
@@ -98,8 +98,8 @@ def test_a_standing_that_sways_is_not_still_and_one_that_turned_takes_the_longer
     recording = take(sensor(gyr))
     (turned,) = stand_all(recording, rests[1], rests, RestParams()).values()
     assert np.allclose(turned.gyro_bias, 0.0)
-    (alone,) = stand_all(recording, rests[1], rests[1:], RestParams()).values()
-    assert alone.gyro_bias[1] == pytest.approx(np.radians(2.5))
+    (single,) = stand_all(recording, rests[1], rests[1:], RestParams()).values()
+    assert single.gyro_bias[1] == pytest.approx(np.radians(2.5))
 
 
 def test_rests_that_never_meet_are_no_rest() -> None:
@@ -147,5 +147,5 @@ def test_invalid_samples_do_not_enter_the_mean() -> None:
     x = sensor(gyr)
     valid = np.ones(500, bool)
     valid[100:200] = False
-    found = measure_standing(replace(x, valid=valid), RATE, (0.0, 5.0), "foot_l")
-    np.testing.assert_allclose(found.gyro_bias, 0.0)
+    result = measure_standing(replace(x, valid=valid), RATE, (0.0, 5.0), "foot_l")
+    np.testing.assert_allclose(result.gyro_bias, 0.0)

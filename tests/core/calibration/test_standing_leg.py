@@ -20,17 +20,19 @@ from sagittal.core.timeline import synchronise
 
 @cache
 def recorded(name: str) -> tuple[SquatSimulation, CalibratedRecording]:
-    made = simulate_movement(name, 1)
-    assert isinstance(made, SquatSimulation)
+    simulation = simulate_movement(name, 1)
+    assert isinstance(simulation, SquatSimulation)
     mounts = make_fixed_mounts(*SIDES)
-    return made, calibrate_with_mounts(synchronise(made.recording), mounts, "fixed_offset", FIXED_OFFSET)
+    return simulation, calibrate_with_mounts(
+        synchronise(simulation.recording), mounts, "fixed_offset", FIXED_OFFSET
+    )
 
 
 def test_a_lifted_foot_does_not_stand() -> None:
-    made, calibrated = recorded("squats_both_legs")
+    recording, calibrated = recorded("squats_both_legs")
     stands = find_standing_legs(calibrated)
     for side in SIDES:
-        height = made.truth.p[FOOT[side]][:, 2]
+        height = recording.truth.p[FOOT[side]][:, 2]
         height = height[: len(stands[side])] - height[0]
         assert stands[side][height < 0.01].all()
         assert not stands[side][height > 0.09].any()
@@ -57,6 +59,6 @@ def test_a_sensor_turned_about_its_bone_or_tilted_on_the_back_changes_nothing(
 def test_a_leg_alone_is_taken_to_stand() -> None:
     _, calibrated = recorded("squats_both_legs")
     segments = {s: x for s, x in calibrated.calibration.segments.items() if not s.endswith("_l")}
-    alone = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
-    assert set(find_standing_legs(alone)) == {"right"}
-    assert find_standing_legs(alone)["right"].all()
+    single_variant = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
+    assert set(find_standing_legs(single_variant)) == {"right"}
+    assert find_standing_legs(single_variant)["right"].all()

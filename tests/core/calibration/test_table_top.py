@@ -39,12 +39,14 @@ def carry(
         swing = rng.uniform(-1.0, 1.0, 3) * np.sin(np.pi * into)[:, None] ** 2
         q = multiply(q, exp(swing * np.sin(turns)[:, None]))
     p = 0.5 * into[:, None] * rng.uniform(-1.0, 1.0, 3)
-    made = ideal_signals(SensorPath(t, p, sign_continuous(q)), EVERY, "instant")
+    result = ideal_signals(SensorPath(t, p, sign_continuous(q)), EVERY, "instant")
     if noise is not None:
-        made = add_sensor_errors(made, noise, RATE, rng, rng)[0]
-    made = SimulatedSignals(made.acc, made.gyr + radians(bias_deg) * np.array([1.0, -1.0, 1.0]), made.mag)
-    n = len(made.acc)
-    return SensorSignals("A", made.acc, made.gyr, None, np.ones(n, bool), np.zeros(n, bool))
+        result = add_sensor_errors(result, noise, RATE, rng, rng)[0]
+    result = SimulatedSignals(
+        result.acc, result.gyr + radians(bias_deg) * np.array([1.0, -1.0, 1.0]), result.mag
+    )
+    n = len(result.acc)
+    return SensorSignals("A", result.acc, result.gyr, None, np.ones(n, bool), np.zeros(n, bool))
 
 
 def take(sensors: dict[Segment, SensorSignals]) -> UniformRecording:
@@ -53,7 +55,7 @@ def take(sensors: dict[Segment, SensorSignals]) -> UniformRecording:
 
 
 def worn_on(segment: Segment) -> Floats:
-    """Orientation (4,) of the sensor on a person who stands neutral."""
+    """Orientation (4,) of the sensor on a neutral person."""
     return from_matrix(R_NEUTRAL @ make_fixed_mounts("right")[segment])
 
 
@@ -64,9 +66,14 @@ def carried(noisy: bool = True, bias_deg: float = 0.5, seed: int = 0) -> Uniform
 
 
 def errors_deg(recording: UniformRecording, params: TableTopParams | None = None) -> Floats:
-    found = calibrate_table_top(recording, params).R_segment_sensor
+    R_segment_sensor = calibrate_table_top(recording, params).R_segment_sensor
     truth = make_fixed_mounts("right")
-    return np.degrees([float(angle_between(from_matrix(found[s]), from_matrix(truth[s]))) for s in found])
+    return np.degrees(
+        [
+            float(angle_between(from_matrix(R_segment_sensor[s]), from_matrix(truth[s])))
+            for s in R_segment_sensor
+        ]
+    )
 
 
 @pytest.mark.slow
@@ -81,7 +88,7 @@ def test_random_ways_lose_at_most_a_degree_and_a_half(seed: int) -> None:
 
 
 def test_whoever_faces_elsewhere_says_so() -> None:
-    """The person stands 30° to the left of the arrow."""
+    """The person faces 30° to the left of the arrow."""
     turned = exp(np.array([0.0, 0.0, radians(30.0)]))
     rng = np.random.default_rng(5)
     recording = take({s: carry(multiply(turned, worn_on(s)), rng, None, 0.0) for s in WORN})
@@ -91,15 +98,15 @@ def test_whoever_faces_elsewhere_says_so() -> None:
 
 @pytest.mark.slow
 def test_a_table_that_is_not_level_is_seen_by_gravity() -> None:
-    """Devices that lie 5° off level, as they are agreed to lie but for that."""
+    """Devices tilted by 5°, otherwise as in the protocol."""
     lean = exp(np.array([radians(5.0), 0.0, 0.0]))
     rng = np.random.default_rng(6)
-    found = {}
+    result = {}
     for s in WORN:
         signals = carry(multiply(conjugate(lean), worn_on(s)), rng, None, 0.0)
         # the same device in a world that is turned by the lean: it begins leaning and ends as worn
-        found[s] = replace(signals, acc=_turn_gravity(signals, lean))
-    assert errors_deg(take(found)).max() < 0.1
+        result[s] = replace(signals, acc=_turn_gravity(signals, lean))
+    assert errors_deg(take(result)).max() < 0.1
 
 
 def _turn_gravity(signals: SensorSignals, lean: Floats) -> Floats:
@@ -118,11 +125,11 @@ def test_drift_is_told_and_its_tilt_taken_off() -> None:
     shank = recording.sensors["shank_r"]
     gyr = shank.gyr.copy()
     gyr[250:1600] += radians(0.8)
-    found = calibrate_table_top(replace(recording, sensors={"shank_r": replace(shank, gyr=gyr)}))
-    assert [n.code for n in found.notices] == ["table_top_drift"]
-    assert np.degrees(found.drift_rad["shank_r"]) > 3.0
+    result = calibrate_table_top(replace(recording, sensors={"shank_r": replace(shank, gyr=gyr)}))
+    assert [n.code for n in result.notices] == ["table_top_drift"]
+    assert np.degrees(result.drift_rad["shank_r"]) > 3.0
     truth = from_matrix(make_fixed_mounts("right")["shank_r"])
-    left = log(multiply(from_matrix(found.R_segment_sensor["shank_r"]), conjugate(truth)))
+    left = log(multiply(from_matrix(result.R_segment_sensor["shank_r"]), conjugate(truth)))
     assert np.degrees(np.abs(left[[0, 2]]).max()) < 0.2, "what is left is about the vertical"
 
 

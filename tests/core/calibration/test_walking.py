@@ -1,4 +1,4 @@
-"""Where somebody walks, where straight, and by how much a sensor has turned."""
+"""Walking, straight walking, and rotation of a sensor."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ WALKS = (T >= 5.0) & (T < 15.0)
 
 def sensor(gyr: Floats | None = None, acc: Floats | None = None, valid: Bools | None = None) -> SensorSignals:
     still = np.tile([0.0, 0.0, GRAVITY], (N, 1))
-    there = np.ones(N, np.bool_) if valid is None else valid
+    target = np.ones(N, np.bool_) if valid is None else valid
     return SensorSignals(
-        "", still if acc is None else acc, np.zeros((N, 3)) if gyr is None else gyr, None, there, ~there
+        "", still if acc is None else acc, np.zeros((N, 3)) if gyr is None else gyr, None, target, ~target
     )
 
 
 def worn(**sensors: SensorSignals) -> UniformRecording:
-    given: dict[Segment, SensorSignals] = sensors  # type: ignore[assignment]
-    return UniformRecording(T, RATE, given, Subject(), "walk", {})
+    inputs: dict[Segment, SensorSignals] = sensors  # type: ignore[assignment]
+    return UniformRecording(T, RATE, inputs, Subject(), "walk", {})
 
 
 def edges(mask: Bools) -> list[float]:
@@ -44,8 +44,8 @@ def edges(mask: Bools) -> list[float]:
 
 def test_legs_that_turn_on_the_average_walk() -> None:
     turns = WALKS[:, None] * np.array([0.0, 1.2, 0.0])
-    given = worn(shank_l=sensor(turns), foot_l=sensor())
-    assert edges(moving_mask(given, PARAMS)) == pytest.approx([5.0, 15.0], abs=0.5)
+    inputs = worn(shank_l=sensor(turns), foot_l=sensor())
+    assert edges(moving_mask(inputs, PARAMS)) == pytest.approx([5.0, 15.0], abs=0.5)
     slower = worn(shank_l=sensor(0.8 * turns), foot_l=sensor())
     assert not moving_mask(slower, PARAMS).any()
 
@@ -73,8 +73,8 @@ BIAS = np.array([0.0, 0.1, 0.0])
 
 
 def turning(rate_deg: float, *segments: Segment) -> list[float]:
-    given = worn(**{s: yawing(rate_deg) for s in segments})
-    mask = turning_mask(given, dict.fromkeys(segments, BIAS), dict.fromkeys(segments, LAID), PARAMS)
+    inputs = worn(**{s: yawing(rate_deg) for s in segments})
+    mask = turning_mask(inputs, dict.fromkeys(segments, BIAS), dict.fromkeys(segments, LAID), PARAMS)
     return edges(mask)
 
 
@@ -118,14 +118,14 @@ def test_straight_parts_are_long_enough_and_without_turns() -> None:
 
 
 def test_a_turn_is_measured_about_the_vertical_whatever_the_mounting() -> None:
-    rest = exp(np.array([0.4, -0.7, 0.2]))
-    turned = multiply(about(2, np.array([0.0, 0.5, -3.0, 3.3])), rest)
-    assert measure_turned_angle(turned, rest) == pytest.approx([0.0, 0.5, -3.0, 3.3 - 2.0 * np.pi])
-    assert measure_turned_angle(-turned, rest) == pytest.approx([0.0, 0.5, -3.0, 3.3 - 2.0 * np.pi])
+    remainder = exp(np.array([0.4, -0.7, 0.2]))
+    turned = multiply(about(2, np.array([0.0, 0.5, -3.0, 3.3])), remainder)
+    assert measure_turned_angle(turned, remainder) == pytest.approx([0.0, 0.5, -3.0, 3.3 - 2.0 * np.pi])
+    assert measure_turned_angle(-turned, remainder) == pytest.approx([0.0, 0.5, -3.0, 3.3 - 2.0 * np.pi])
 
 
 def test_the_mean_turn_is_that_on_a_circle() -> None:
-    rest = about(0, 0.3)
-    turned = multiply(about(2, np.radians([90.0, 170.0, -170.0, 10.0])), rest)
-    assert abs(mean_turn(turned, rest, (1, 3))) == pytest.approx(np.pi)
-    assert mean_turn(turned, rest, (0, 1)) == pytest.approx(0.5 * np.pi)
+    remainder = about(0, 0.3)
+    turned = multiply(about(2, np.radians([90.0, 170.0, -170.0, 10.0])), remainder)
+    assert abs(mean_turn(turned, remainder, (1, 3))) == pytest.approx(np.pi)
+    assert mean_turn(turned, remainder, (0, 1)) == pytest.approx(0.5 * np.pi)

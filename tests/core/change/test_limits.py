@@ -20,9 +20,9 @@ from sagittal.core.change.limits import (
     ("before", "limit"), [(0.0, 0.10), (0.39, 0.10), (0.40, 0.15), (0.79, 0.15), (0.80, 0.18), (2.0, 0.18)]
 )
 def test_speed_has_a_limit_by_how_fast_somebody_walked(before: float, limit: float) -> None:
-    found = find_detectable_change("gait_speed_mps", before)
-    assert found is not None
-    assert found.value == limit
+    result = find_detectable_change("gait_speed_mps", before)
+    assert result is not None
+    assert result.value == limit
 
 
 @pytest.mark.parametrize(
@@ -39,13 +39,13 @@ def test_speed_has_a_limit_by_how_fast_somebody_walked(before: float, limit: flo
 def test_ranges_have_limits_by_limb_and_the_larger_one_where_no_side_is_affected(
     name: str, limb: Limb | None, detectable: float, relevant: float
 ) -> None:
-    for found, value in (
+    for result, value in (
         (find_detectable_change(name, 50.0, limb), detectable),
         (find_relevant_change(name, limb), relevant),
     ):
-        assert found is not None
-        assert found.value == pytest.approx(value)
-        assert "Guzik" in found.source
+        assert result is not None
+        assert result.value == pytest.approx(value)
+        assert "Guzik" in result.source
 
 
 def test_what_no_source_limits_has_no_limit() -> None:
@@ -56,9 +56,9 @@ def test_what_no_source_limits_has_no_limit() -> None:
 
 
 def test_a_score_is_found_by_its_own_name() -> None:
-    found = find_relevant_change("gps_deg")
-    assert found is not None
-    assert (found.value, found.people) == (1.6, "children")
+    result = find_relevant_change("gps_deg")
+    assert result is not None
+    assert (result.value, result.people) == (1.6, "children")
     assert find_detectable_change("gps_deg", 8.0) is None
 
 
@@ -66,21 +66,21 @@ def test_a_score_is_found_by_its_own_name() -> None:
     ("name", "limit"), [("step_length_m", 0.15), ("swing_time_s", 0.26), ("stance_time_s", 0.09)]
 )
 def test_ratios_have_limits_of_their_own(name: str, limit: float) -> None:
-    found = detectable_ratio(name)
-    assert found is not None
-    assert found.value == limit
-    assert "Lewek & Randall 2011" in found.source
+    result = detectable_ratio(name)
+    assert result is not None
+    assert result.value == limit
+    assert "Lewek & Randall 2011" in result.source
 
 
 def test_the_error_within_people_is_pooled_by_their_freedom() -> None:
-    found = estimate_repeatability(
+    repeatability = estimate_repeatability(
         [[60.0, 62.0], [50.0, 51.0], [55.0, 55.0], [70.0, 72.0], [64.0, 63.0], [9.0]]
     )
-    assert found is not None
+    assert repeatability is not None
     # pooled within-person variance (2 + .5 + 0 + 2 + .5) / 5 = 1
-    assert found.sem == pytest.approx(1.0)
-    assert (found.people, found.repeats) == (5, 10)
-    assert found.mdc95 == pytest.approx(2.772, abs=0.001)
+    assert repeatability.sem == pytest.approx(1.0)
+    assert (repeatability.people, repeatability.repeats) == (5, 10)
+    assert repeatability.mdc95 == pytest.approx(2.772, abs=0.001)
     uneven = estimate_repeatability([[1.0, 3.0, 5.0], *[[2.0, 2.0]] * 4])
     assert uneven is not None
     assert uneven.sem == pytest.approx(sqrt(8.0 / 6.0))
@@ -94,10 +94,10 @@ def test_fewer_than_five_people_measured_twice_give_no_limit() -> None:
 
 
 def test_an_own_limit_says_whose_it_is() -> None:
-    found = estimate_repeatability([[0.0, 2.0]] * 6)
-    assert found is not None
-    assert found.limit == ChangeLimit(
-        found.mdc95, "6 people of this clinic", "own repeated measurements, n = 6"
+    repeatability = estimate_repeatability([[0.0, 2.0]] * 6)
+    assert repeatability is not None
+    assert repeatability.limit == ChangeLimit(
+        repeatability.mdc95, "6 people of this clinic", "own repeated measurements, n = 6"
     )
 
 

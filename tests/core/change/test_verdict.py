@@ -28,10 +28,10 @@ def parameter(name: str, mean: float | None, side: Side | None = None, unit: str
 
 
 def one(
-    name: str, before: float | None, after: float | None, side: Side | None = None, **more: object
+    name: str, earlier: float | None, later: float | None, side: Side | None = None, **more: object
 ) -> Change:
     unit = "m/s" if name.endswith("_mps") else "deg" if name.endswith("_deg") else "m"
-    pair = parameter(name, before, side, unit), parameter(name, after, side, unit)
+    pair = parameter(name, earlier, side, unit), parameter(name, later, side, unit)
     (change,) = parameter_changes([pair[0]], [pair[1]], **more)  # type: ignore[arg-type]
     return change
 
@@ -43,9 +43,9 @@ def test_three_strides_are_no_change_whatever_they_measure(few: str) -> None:
         replace(parameter("knee_flexion_rom_deg", v, "left"), n=strides[k])
         for k, v in (("before", 40.0), ("after", 60.0))
     )
-    (found,) = parameter_changes([old], [new])
-    assert (found.verdict, found.limit, found.reason) == (None, None, "too_few_strides")
-    assert (found.before, found.after, found.difference) == (40.0, 60.0, 20.0)
+    (result,) = parameter_changes([old], [new])
+    assert (result.verdict, result.limit, result.reason) == (None, None, "too_few_strides")
+    assert (result.before, result.after, result.difference) == (40.0, 60.0, 20.0)
 
 
 @pytest.mark.parametrize("guessed", ["before", "after"])
@@ -54,9 +54,9 @@ def test_an_estimated_angle_is_not_compared_with_a_measured_one(guessed: str) ->
         replace(parameter("knee_flexion_rom_deg", v, "left"), estimated=k == guessed)
         for k, v in (("before", 52.4), ("after", 79.2))
     )
-    (found,) = parameter_changes([old], [new])
-    assert (found.verdict, found.difference, found.reason) == (None, None, "not_measured_alike")
-    assert (found.before, found.after) == (52.4, 79.2)
+    (result,) = parameter_changes([old], [new])
+    assert (result.verdict, result.difference, result.reason) == (None, None, "not_measured_alike")
+    assert (result.before, result.after) == (52.4, 79.2)
     (alike,) = parameter_changes([replace(old, estimated=True)], [replace(new, estimated=True)])
     assert alike.difference == pytest.approx(26.8)
 
@@ -78,10 +78,10 @@ def test_gait_speed_has_limits_by_the_speed_before(
     before: float, after: float, limit: float, verdict: str
 ) -> None:
     """Lewek 2019 by strata; Tilson 2010: 0.16 m/s matters, but not below the measurement error."""
-    found = one("gait_speed_mps", before, after)
-    assert (found.limit, found.verdict, found.mcid) == (limit, verdict, 0.16)
-    assert "Lewek" in str(found.limit_source)
-    assert "stroke" in str(found.people)
+    result = one("gait_speed_mps", before, after)
+    assert (result.limit, result.verdict, result.mcid) == (limit, verdict, 0.16)
+    assert "Lewek" in str(result.limit_source)
+    assert "stroke" in str(result.people)
 
 
 def test_the_range_of_the_knee_has_limits_by_limb() -> None:
@@ -97,8 +97,8 @@ def test_the_range_of_the_knee_has_limits_by_limb() -> None:
 
 
 def test_what_has_no_limit_has_no_verdict() -> None:
-    found = one("foot_pitch_ic_deg", 10.0, 20.0, "left")
-    assert (found.verdict, found.reason, found.difference) == (None, "no_mdc", 10.0)
+    result = one("foot_pitch_ic_deg", 10.0, 20.0, "left")
+    assert (result.verdict, result.reason, result.difference) == (None, "no_mdc", 10.0)
     missing = one("gait_speed_mps", None, 1.0)
     assert (missing.verdict, missing.reason, missing.difference) == (None, "no_value", None)
     (new,) = parameter_changes([], [parameter("gait_speed_mps", 1.0, None, "m/s")])
@@ -108,23 +108,25 @@ def test_what_has_no_limit_has_no_verdict() -> None:
 def test_few_wild_strides_widen_the_limit() -> None:
     """The published 6.7 cm takes a steady mean for granted; five strides ± 8 cm are not one."""
     rng = np.random.default_rng(1)
-    before, after = (
+    initial, final = (
         summarise_values("step_length_m", "left", (m + 0.08 * rng.standard_normal(5)).tolist(), "m")
         for m in (0.40, 0.50)
     )
-    (found,) = parameter_changes([before], [after])
-    assert found.limit is not None
-    assert found.limit > 0.067
-    assert found.limit_source == "strides and measurement of the two visits, 95 %"
+    (result,) = parameter_changes([initial], [final])
+    assert result.limit is not None
+    assert result.limit > 0.067
+    assert result.limit_source == "strides and measurement of the two visits, 95 %"
     many = [summarise_values("step_length_m", "left", [m - 0.01, m + 0.01] * 30, "m") for m in (0.40, 0.50)]
     (steady,) = parameter_changes([many[0]], [many[1]])
     assert (steady.limit, steady.verdict) == (0.067, "real_change")
 
 
 def test_own_repeated_measurements_go_before_published_limits() -> None:
-    found = estimate_repeatability([[60.0, 62.0], [50.0, 51.0], [55.0, 55.0], [70.0, 72.0], [64.0, 63.0]])
-    assert found is not None
-    change = one("knee_flexion_rom_deg", 50.0, 53.0, "left", own={"knee_flexion_rom_deg": found})
+    repeatability = estimate_repeatability(
+        [[60.0, 62.0], [50.0, 51.0], [55.0, 55.0], [70.0, 72.0], [64.0, 63.0]]
+    )
+    assert repeatability is not None
+    change = one("knee_flexion_rom_deg", 50.0, 53.0, "left", own={"knee_flexion_rom_deg": repeatability})
     assert change.verdict == "real_change"
     assert "own repeated" in str(change.limit_source)
 
@@ -144,8 +146,8 @@ def test_each_visit_is_placed_in_the_norm_at_its_own_speed() -> None:
     assert one(name, 31.6, 27.2, norms=(faster, faster)).towards_norm is False
     assert one(name, 31.6, 27.2, norms=({}, faster)).towards_norm is None
     assert one(name, 31.6, 27.2, norms=(slow, {})).towards_norm is None
-    other = {name: replace(slow[name], comparable=False)}
-    assert one(name, 31.6, 27.2, norms=(other, faster)).towards_norm is None
+    second = {name: replace(slow[name], comparable=False)}
+    assert one(name, 31.6, 27.2, norms=(second, faster)).towards_norm is None
 
 
 def test_levels_from_standing_say_so() -> None:
@@ -185,10 +187,10 @@ def test_scores_know_their_way_but_no_error_of_their_own() -> None:
     assert (index.towards_norm, index.mcid) == (True, None)
     own = estimate_repeatability([[5.0, 5.4]] * 6)
     assert own is not None
-    (judged,) = score_changes([score(9.0)], [score(7.0)], {score_name(score(1.0)): own})
-    assert judged.verdict == "clinically_relevant"
+    (verdicts,) = score_changes([score(9.0)], [score(7.0)], {score_name(score(1.0)): own})
+    assert verdicts.verdict == "clinically_relevant"
 
 
 def test_raw_and_shape_are_never_compared() -> None:
-    (found,) = score_changes([score(9.0, "raw")], [score(4.0, "offset_removed")])
-    assert (found.reason, found.difference) == ("no_value", None)
+    (result,) = score_changes([score(9.0, "raw")], [score(4.0, "offset_removed")])
+    assert (result.reason, result.difference) == ("no_value", None)

@@ -1,4 +1,4 @@
-"""What is known before a take survives JSON, and nonsense is refused."""
+"""Values known before a trial survive JSON; invalid ones are refused."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From strides to cues: what is shown, when it gets harder, when it ends, and what does not count."""
+"""From strides to cues: display, progression, end, and uncounted strides."""
 
 from __future__ import annotations
 
@@ -90,10 +90,10 @@ def test_fading_and_probe_blocks_are_recorded_with_every_stride() -> None:
     given_schedule = {"kind": "fading", "shares_pct": [100, 50, 0], "strides_per_share": 8, "probe_every": 8,
                       "probe_strides": 2}  # fmt: skip
     cues, _ = train([0.4] * 30, prescription(schedule=given_schedule))
-    why = [c.why_not for c in cues]
-    assert why[:10] == [None] * 8 + ["probe"] * 2
-    assert why[10:20] == ["faded", None] * 4 + ["probe"] * 2
-    assert why[20:] == ["faded"] * 8 + ["probe"] * 2
+    why_nots = [c.why_not for c in cues]
+    assert why_nots[:10] == [None] * 8 + ["probe"] * 2
+    assert why_nots[10:20] == ["faded", None] * 4 + ["probe"] * 2
+    assert why_nots[20:] == ["faded"] * 8 + ["probe"] * 2
     assert [c.block for c in cues if c.why_not == "probe"] == [1, 1, 2, 2, 3, 3]
     assert all(c.block is None for c in cues if c.why_not != "probe")
 
@@ -145,24 +145,29 @@ def test_turns_gaps_missing_values_and_repeats_give_no_cue_and_do_not_count() ->
 def test_a_late_stride_is_not_shown_and_neither_is_one_while_data_is_stale() -> None:
     engine = FeedbackEngine(prescription(), OPEN)
     on_time, late = walked(0, 0.4), walked(2, 0.4)
-    shown = engine.push(on_time, on_time.detected_s + LATE_S)
+    visible_frame = engine.push(on_time, on_time.detected_s + LATE_S)
     old = engine.push(late, late.detected_s + LATE_S + 0.01)
     engine.command("stale", True)
     stale = engine.push(walked(4, 0.4))
     engine.command("stale", False)
-    again = engine.push(walked(6, 0.4))
-    assert [c and c.why_not for c in (shown, old, stale, again)] == [None, "stale", "stale", None]
+    second_frame = engine.push(walked(6, 0.4))
+    assert [c and c.why_not for c in (visible_frame, old, stale, second_frame)] == [
+        None,
+        "stale",
+        "stale",
+        None,
+    ]
 
 
 def test_off_and_pause_hold_the_schedule_and_the_level_rule() -> None:
     engine = FeedbackEngine(prescription(schedule={"probe_every": 4, "probe_strides": 2}), OPEN)
-    seen: list[Cue] = []
+    observations: list[Cue] = []
 
     def walk(strides: int) -> None:
         for _ in range(strides):
-            cue = engine.push(walked(2 * len(seen), 0.4))
+            cue = engine.push(walked(2 * len(observations), 0.4))
             assert cue is not None
-            seen.append(cue)
+            observations.append(cue)
 
     walk(2)
     engine.command("pause", True)
@@ -173,7 +178,9 @@ def test_off_and_pause_hold_the_schedule_and_the_level_rule() -> None:
     engine.command("feedback", True)
     assert engine.state.next_probe == 2
     walk(3)
-    assert [c.why_not for c in seen] == [None] * 2 + ["paused"] * 3 + ["off"] * 3 + [None] * 2 + ["probe"]
+    assert [c.why_not for c in observations] == [None] * 2 + ["paused"] * 3 + ["off"] * 3 + [None] * 2 + [
+        "probe"
+    ]
     assert engine.state.window_n == 4
     assert engine.state.without_feedback.n == 7
 
@@ -229,15 +236,15 @@ def test_whatever_happens_levels_have_bounds_and_a_cue_says_why_it_is_not_shown(
 ) -> None:
     def run() -> list[tuple[Cue, Any]]:
         engine = FeedbackEngine(prescription(schedule={"kind": "fading", "probe_every": 7}), baseline)
-        made = []
+        result = []
         for n, step in enumerate(steps):
             if isinstance(step, tuple):
                 engine.command(*step)
                 continue
             cue = engine.push(walked(n, step))
             assert cue is not None
-            made.append((cue, engine.state.to_json()))
-        return made
+            result.append((cue, engine.state.to_json()))
+        return result
 
     first = run()
     for cue, state in first:

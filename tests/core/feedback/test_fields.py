@@ -1,4 +1,4 @@
-"""Reading a record field by field: defaults, limits, and refusals that say what was expected."""
+"""Field-by-field reading of a record: defaults, limits, refusals naming the expected value."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def read_all(f: RecordFields) -> list[object]:
 
 
 def test_what_is_there_is_read() -> None:
-    found = read_all(RecordFields("record", FULL))
-    assert found == [2.0, None, 3, None, True, "b", ("a", "b"), (100, 0), "words", 1.0]
-    assert [type(x) for x in found[:3]] == [float, type(None), int]
+    result = read_all(RecordFields("record", FULL))
+    assert result == [2.0, None, 3, None, True, "b", ("a", "b"), (100, 0), "words", 1.0]
+    assert [type(x) for x in result[:3]] == [float, type(None), int]
 
 
 def test_what_is_left_out_has_its_default() -> None:

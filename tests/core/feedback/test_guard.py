@@ -1,4 +1,4 @@
-"""The guard sees what changes beside the target, and says what it is held against."""
+"""The guard detects changes of other parameters and names its limit."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from tests.helpers.feedback import OPEN, prescription, walked
 
 def curves(added_deg: float = 0.0) -> Mapping[str, Floats]:
     """Curves of healthy adults, the knee's with a wave more."""
-    found = {v: np.radians(adult_reference().mean_deg[v]) for v in SAGITTAL}
+    result = {v: np.radians(adult_reference().mean_deg[v]) for v in SAGITTAL}
     wave = np.sqrt(2.0) * np.cos(np.linspace(0.0, 2.0 * np.pi, 101)[:-1])
-    found["knee_flexion"] = found["knee_flexion"] + np.radians(added_deg * np.append(wave, wave[0]))
-    return found
+    result["knee_flexion"] = result["knee_flexion"] + np.radians(added_deg * np.append(wave, wave[0]))
+    return result
 
 
 def walk(
-    other: list[float], gps: list[float] | None = None, baseline: Baseline = OPEN, **changes: Any
+    second: list[float], gps: list[float] | None = None, baseline: Baseline = OPEN, **changes: Any
 ) -> FeedbackEngine:
     """Left and right in turn; the right, untrained one has these values."""
     engine = FeedbackEngine(prescription(**changes), baseline)
-    for i, value in enumerate(other):
+    for i, value in enumerate(second):
         shape = {} if gps is None else curves(gps[i])
         engine.push(walked(2 * i, 0.4, curves=shape))
         engine.push(walked(2 * i + 1, value, "right", curves=shape))
@@ -37,21 +37,21 @@ def walk(
 
 
 def test_a_change_of_the_other_side_beyond_its_mdc_is_watched_with_its_source() -> None:
-    known = Baseline(0.4, 0.03, 40, "before", other_mdc=0.067, other_mdc_source="Kesar et al. 2011")
-    calm = walk([0.60] * FIRST + [0.55] * LAST, baseline=known).state.guard
+    reference = Baseline(0.4, 0.03, 40, "before", other_mdc=0.067, other_mdc_source="Kesar et al. 2011")
+    calm = walk([0.60] * FIRST + [0.55] * LAST, baseline=reference).state.guard
     assert calm.other.change == pytest.approx(-0.05)
     assert (calm.other.limit, calm.other.source) == (0.067, "Kesar et al. 2011")
     assert (calm.other.beyond, calm.state) == (False, "ok")
-    worse = walk([0.60] * FIRST + [0.52] * LAST, baseline=known).state.guard
+    worse = walk([0.60] * FIRST + [0.52] * LAST, baseline=reference).state.guard
     assert (worse.other.beyond, worse.state) == (True, "watch")
 
 
 def test_without_an_mdc_two_sd_of_the_first_strides_are_the_limit() -> None:
     first = [0.58, 0.62] * (FIRST // 2)
-    found = walk(first + [0.56] * LAST).state.guard.other
-    assert found.limit == pytest.approx(2.0 * float(np.std(first, ddof=1)))
-    assert found.source == "2 SD of the first 10 strides"
-    assert not found.beyond
+    result = walk(first + [0.56] * LAST).state.guard.other
+    assert result.limit == pytest.approx(2.0 * float(np.std(first, ddof=1)))
+    assert result.source == "2 SD of the first 10 strides"
+    assert not result.beyond
     assert walk(first + [0.50] * LAST, guard={"other_change": 0.2}).state.guard.other.limit == 0.2
 
 

@@ -18,17 +18,17 @@ RULE = Progression(window=4, share=0.7, away_share=0.5)
 def ladder(
     baseline: Baseline | None = None, zones: Zones = LOW, rule: Progression = RULE, level: int | None = None
 ) -> Ladder:
-    made = Ladder(zones, rule, baseline or Baseline())
+    result = Ladder(zones, rule, baseline or Baseline())
     if level is not None:
-        made.move(level)
-    return made
+        result.move(level)
+    return result
 
 
-def walk(made: Ladder, *zones: Zone) -> int:
+def walk(result: Ladder, *zones: Zone) -> int:
     for zone in zones:
-        made.add_stride(zone)
-    made.follow_rule()
-    return made.level
+        result.add_stride(zone)
+    result.follow_rule()
+    return result.level
 
 
 @pytest.mark.parametrize(
@@ -44,9 +44,9 @@ def walk(made: Ladder, *zones: Zone) -> int:
 def test_it_begins_where_the_last_training_ended_else_by_the_record_else_by_the_person(
     baseline: Baseline, start: int | None, level: int
 ) -> None:
-    made = Ladder(LOW, Progression(start_level=start), baseline)
-    assert made.level == level
-    assert made.known == (baseline != Baseline() or start is not None)
+    result = Ladder(LOW, Progression(start_level=start), baseline)
+    assert result.level == level
+    assert result.known == (baseline != Baseline() or start is not None)
 
 
 def test_the_side_of_the_person_comes_from_before_or_from_the_first_strides() -> None:
@@ -60,18 +60,18 @@ def test_the_side_of_the_person_comes_from_before_or_from_the_first_strides() ->
 
 
 def test_first_strides_do_not_move_a_level_that_is_known() -> None:
-    made = Ladder(ZONES, Progression(start_level=1), Baseline())
-    assert not made.known, "the side is not"
-    made.end_first_strides([0.30])
-    assert (made.level, made.zones.worse, made.known) == (1, "low", True)
+    result = Ladder(ZONES, Progression(start_level=1), Baseline())
+    assert not result.known, "the side is not"
+    result.end_first_strides([0.30])
+    assert (result.level, result.zones.worse, result.known) == (1, "low", True)
 
 
 def test_a_full_window_in_the_zone_makes_it_harder_and_a_new_one_begins() -> None:
-    made = ladder(level=3)
-    assert walk(made, "in", "in", "in") == 3, "the window is not full"
-    assert made.window_n == 3
-    assert walk(made, "low") == 2
-    assert (made.window_n, made.share("in")) == (0, None)
+    result = ladder(level=3)
+    assert walk(result, "in", "in", "in") == 3, "the window is not full"
+    assert result.window_n == 3
+    assert walk(result, "low") == 2
+    assert (result.window_n, result.share("in")) == (0, None)
 
 
 def test_the_share_itself_is_not_enough() -> None:
@@ -89,33 +89,33 @@ def test_only_strides_on_the_worse_side_make_it_easier() -> None:
 
 
 def test_only_the_last_window_counts() -> None:
-    made = ladder(level=3)
-    assert walk(made, "low", "low", "in", "in") == 3
-    assert walk(made, "in", "in") == 2
+    result = ladder(level=3)
+    assert walk(result, "low", "low", "in", "in") == 3
+    assert walk(result, "in", "in") == 2
 
 
 def test_levels_end_at_the_hardest_and_the_easiest() -> None:
-    made = ladder()
-    assert walk(made, "in", "in", "in", "in") == 0
-    assert made.window_n == 4, "the level did not change, so the strides stay"
-    made.move(LEVELS + 5)
-    assert made.level == LEVELS
-    made.move(-100)
-    assert made.level == 0
+    result = ladder()
+    assert walk(result, "in", "in", "in", "in") == 0
+    assert result.window_n == 4, "the level did not change, so the strides stay"
+    result.move(LEVELS + 5)
+    assert result.level == LEVELS
+    result.move(-100)
+    assert result.level == 0
 
 
 def test_a_rule_that_is_off_leaves_it_to_people() -> None:
-    made = ladder(rule=Progression(automatic=False, window=2), level=3)
-    assert walk(made, "in", "in", "in") == 3
-    made.move(-1)
-    assert made.level == 2
+    result = ladder(rule=Progression(automatic=False, window=2), level=3)
+    assert walk(result, "in", "in", "in") == 3
+    result.move(-1)
+    assert result.level == 2
 
 
 def test_zones_are_those_of_the_level() -> None:
-    made = ladder(level=2)
-    assert made.limits == pytest.approx((0.45, 0.65))
-    assert (made.zone(0.46), made.zone(0.44), made.zone(0.39)) == ("in", "near_low", "low")
-    made.add_stride("in")
-    made.add_stride("low")
-    assert made.share("in") == made.share("low") == 0.5
-    assert made.share("high") == 0.0
+    result = ladder(level=2)
+    assert result.limits == pytest.approx((0.45, 0.65))
+    assert (result.zone(0.46), result.zone(0.44), result.zone(0.39)) == ("in", "near_low", "low")
+    result.add_stride("in")
+    result.add_stride("low")
+    assert result.share("in") == result.share("low") == 0.5
+    assert result.share("high") == 0.0

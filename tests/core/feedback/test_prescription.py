@@ -1,4 +1,4 @@
-"""A record is read back as it was written, and one that makes no sense is refused with a sentence."""
+"""Records are read back unchanged; invalid ones are refused with a message."""
 
 from __future__ import annotations
 
@@ -27,17 +27,21 @@ def record(**changes: Any) -> dict[str, Any]:
 
 
 def test_a_record_survives_json() -> None:
-    made = prescription(
+    result = prescription(
         modes=["zone", "tone"], schedule={"kind": "fading", "shares_pct": [100, 75, 0], "probe_every": 30}
     )
-    assert Prescription.from_json(json.loads(json.dumps(made.to_json()))) == made
+    assert Prescription.from_json(json.loads(json.dumps(result.to_json()))) == result
 
 
 def test_what_is_left_out_has_its_default() -> None:
-    made = Prescription.from_json({"parameter": "stance_pct", "side": "right"})
-    assert made.target.source == "norm"
-    assert made.schedule.shares_pct == (100, 50, 0)
-    assert (made.progression.window, made.progression.share, made.progression.sd_per_level) == (20, 0.7, 1.0)
+    result = Prescription.from_json({"parameter": "stance_pct", "side": "right"})
+    assert result.target.source == "norm"
+    assert result.schedule.shares_pct == (100, 50, 0)
+    assert (result.progression.window, result.progression.share, result.progression.sd_per_level) == (
+        20,
+        0.7,
+        1.0,
+    )
 
 
 def test_every_parameter_of_a_stride_can_be_trained() -> None:
@@ -83,8 +87,8 @@ def test_a_record_that_makes_no_sense_is_refused(data: Any, said: str) -> None:
 
 
 def test_a_baseline_and_a_cue_survive_json() -> None:
-    known = Baseline(0.4, 0.03, 40, "before", 3, 0.067, "Kesar", after_training=True)
-    assert Baseline.from_json(json.loads(json.dumps(known.to_json()))) == known
+    reference = Baseline(0.4, 0.03, 40, "before", 3, 0.067, "Kesar", after_training=True)
+    assert Baseline.from_json(json.loads(json.dumps(reference.to_json()))) == reference
     cue = Cue(
         3, "left", 1.5, 2.5, 0.4, -4.0, "low", shown=True, why_not=None, level=1, zone_low=0.5,
         zone_high=0.65, tone=Tone(880.0, 1.0), block=2, share_in_zone_last20=0.25,

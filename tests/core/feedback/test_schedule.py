@@ -46,12 +46,12 @@ def test_probe_blocks_have_their_length_and_distance_and_no_feedback(schedule: S
         return
     whole = schedule.probe_every + schedule.probe_strides
     for i, p in enumerate(places):
-        cycle, at = divmod(i, whole)
-        if at < schedule.probe_every:
-            assert (p.block, p.block_left, p.next_probe) == (None, None, schedule.probe_every - at)
+        cycle, position = divmod(i, whole)
+        if position < schedule.probe_every:
+            assert (p.block, p.block_left, p.next_probe) == (None, None, schedule.probe_every - position)
         else:
             assert (p.block, p.shown, p.next_probe) == (cycle + 1, False, None)
-            assert p.block_left == whole - at
+            assert p.block_left == whole - position
 
 
 def test_half_is_every_second_stride() -> None:

@@ -25,7 +25,7 @@ TURN = about(2, np.radians(4.0))
 
 
 class Ticks:
-    """A clock that goes on by a second each time it is read."""
+    """Clock that advances by a second with each reading."""
 
     def __init__(self) -> None:
         self.now = 0.0
@@ -65,9 +65,9 @@ def truth_table(truth: WalkTruth, error: Floats | None = None) -> OrientationTab
 
 @pytest.mark.sweep
 def test_one_filter_alone_has_no_spread_and_is_its_own_median() -> None:
-    found = compare("mahony_2008")
-    assert all(np.nanmax(s.sd) < 1e-9 and np.nanmax(s.range) < 1e-9 for s in found.spreads)
-    own, mahony = found.filters
+    comparison = compare("mahony_2008")
+    assert all(np.nanmax(s.sd) < 1e-9 and np.nanmax(s.range) < 1e-9 for s in comparison.spreads)
+    own, mahony = comparison.filters
     assert mahony.to_median is not None
     assert mahony.to_median.total < 1e-7
     # the product's own chain is another filter and a body model: near, not the same
@@ -78,8 +78,8 @@ def test_one_filter_alone_has_no_spread_and_is_its_own_median() -> None:
 
 def test_two_filters_are_half_their_range_apart_and_the_phases_are_of_the_same_size() -> None:
     for s in two().spreads:
-        known = np.isfinite(s.sd)
-        np.testing.assert_allclose(2.0 * s.sd[known], s.range[known], atol=1e-9)
+        known_finite = np.isfinite(s.sd)
+        np.testing.assert_allclose(2.0 * s.sd[known_finite], s.range[known_finite], atol=1e-9)
         assert s.filters == 2
         assert set(s.cycle_sd) == (
             {"left"} if "_l" in s.name else {"right"} if "_r" in s.name else {"left", "right"}
@@ -94,8 +94,8 @@ def test_two_filters_are_half_their_range_apart_and_the_phases_are_of_the_same_s
 
 
 def test_all_begin_where_the_analysis_stands() -> None:
-    at = two().t_s < 2.0
-    assert all(np.nanmax(s.range[at]) < np.radians(1.0) for s in two().spreads)
+    index = two().t_s < 2.0
+    assert all(np.nanmax(s.range[index]) < np.radians(1.0) for s in two().spreads)
 
 
 def test_what_needs_a_magnetometer_says_so_and_the_others_are_compared() -> None:
@@ -131,16 +131,16 @@ def test_a_diverging_filter_is_told_and_left_out(monkeypatch: pytest.MonkeyPatch
         return whole(name, x, rate_hz)
 
     monkeypatch.setattr(run, "_orient_by_published", break_down)
-    found = compare("mahony_2008", "hua_2014")
-    assert [n.code for n in found.filters[-1].told] == ["filter_diverged"]
-    assert {s.filters for s in found.spreads} == {1}
+    comparison = compare("mahony_2008", "hua_2014")
+    assert [n.code for n in comparison.filters[-1].told] == ["filter_diverged"]
+    assert {s.filters for s in comparison.spreads} == {1}
 
 
 def test_the_truth_as_reference_is_laid_on_the_take_and_finds_the_errors_of_filters() -> None:
     """Its clock, world and clusters are unknown; Mahony's filter is within 2° of the truth on the shank."""
     _, truth = simulated("comfortable")
-    found = compare("mahony_2008", magnetometer=False, reference=truth_table(truth))
-    r = found.reference
+    comparison = compare("mahony_2008", magnetometer=False, reference=truth_table(truth))
+    r = comparison.reference
     assert r is not None
     assert r.lag_s == pytest.approx(-LAG_S, abs=0.003)
     assert r.correlation > 0.95
@@ -189,9 +189,9 @@ def test_an_error_of_the_reference_that_comes_and_goes_is_found_in_the_rmse() ->
 def test_a_reference_of_another_movement_is_refused() -> None:
     _, truth = simulated("comfortable")
     t = np.arange(0.0, 40.0, 0.01)
-    other = {"pelvis": about(0, 0.3 * np.sin(t**1.5))}
+    second = {"pelvis": about(0, 0.3 * np.sin(t**1.5))}
     with pytest.raises(FormatError, match="correlate") as caught:
-        compare("mahony_2008", reference=OrientationTable("other.csv", t, other))
+        compare("mahony_2008", reference=OrientationTable("other.csv", t, second))
     assert caught.value.code == "other_movement"
     with pytest.raises(FormatError) as caught:
         compare("mahony_2008", reference=replace(truth_table(truth), q={"head": truth.q["pelvis"]}))

@@ -1,4 +1,4 @@
-"""How often healthy people pass the limits: rarely, or the limit says little."""
+"""Healthy people rarely exceed the limits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ OFTEN = {"knee_hyperextension": 0.15}
 @pytest.mark.recorded
 def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
     beyond: Counter[str] = Counter()
-    judged: Counter[str] = Counter()
+    verdict: Counter[str] = Counter()
     for person in people():
         curves = CycleCurves(
             {v: {s: np.radians(np.tile(person[s][v], (4, 1))) for s in SIDES} for v in person["left"]},
@@ -30,10 +30,10 @@ def test_one_healthy_side_in_twenty_at_most_passes_a_limit() -> None:
         )
         for f in judge_flags(curves, [], dict.fromkeys(NAMES, 0.0)):
             if f.exceeded is not None:
-                judged[f.name] += 1
+                verdict[f.name] += 1
                 beyond[f.name] += f.exceeded
-    shares = {name: beyond[name] / n for name, n in judged.items()}
-    assert {name for name, n in judged.items() if n == 84} == {
+    shares = {name: beyond[name] / n for name, n in verdict.items()}
+    assert {name for name, n in verdict.items() if n == 84} == {
         "stiff_knee", "low_knee_flexion_swing", "knee_hyperextension", "low_dorsiflexion_swing", "hip_hiking",
         "low_hip_extension", "hip_range_asymmetry", "knee_range_asymmetry", "ankle_range_asymmetry",
     }  # fmt: skip

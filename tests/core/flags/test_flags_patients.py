@@ -26,32 +26,32 @@ STRAIGHT = np.radians(10.0)
 def session(name: str, seed: int = 5) -> tuple[CycleCurves, tuple[Parameter, ...], dict[str, float]]:
     """Curves from standing, parameters, and what an exact goniometer reads in standing."""
     truth = simulated(name, seed)[1]
-    made = []
+    output = []
     for side in SIDES:
         own = [s for s in truth.strides if s.side == side]
-        others = [s for s in truth.strides if s.side != side]
+        remaining = [s for s in truth.strides if s.side != side]
         for s in own[1:-1]:
-            ic = [o.start_s for o in others if s.start_s < o.start_s < s.end_s]
-            tc = [o.release_s for o in others if s.start_s < o.release_s < s.end_s]
+            ic = [o.start_s for o in remaining if s.start_s < o.start_s < s.end_s]
+            tc = [o.release_s for o in remaining if s.start_s < o.release_s < s.end_s]
             turned = None if abs(s.turn_rad) < STRAIGHT else "turn"
             first, last = min(tc, default=None), min(ic, default=None)
-            made.append(Stride(side, s.start_s, s.release_s, s.end_s, first, last, s.turn_rad, turned))
-    strides = Strides(tuple(made))
+            output.append(Stride(side, s.start_s, s.release_s, s.end_s, first, last, s.turn_rad, turned))
+    strides = Strides(tuple(output))
     angles = JointAngles(truth.t_s, truth.subtract_standing(), truth.zero_offset)
-    p, q = ({s: of[FOOT[s]] for s in SIDES} for of in (truth.p, truth.q))
-    there = np.ones(len(truth.t_s), np.bool_)
+    p, q = ({s: source[FOOT[s]] for s in SIDES} for source in (truth.p, truth.q))
+    mask = np.ones(len(truth.t_s), np.bool_)
     feet = FootTracks(
-        truth.t_s, truth.rate_hz, p, q, truth.flat, dict.fromkeys(SIDES, there), True, "truth", truth.body
+        truth.t_s, truth.rate_hz, p, q, truth.flat, dict.fromkeys(SIDES, mask), True, "truth", truth.body
     )
-    oriented = Orientations(truth.t_s, truth.rate_hz, truth.q, dict.fromkeys(truth.q, there), "truth")
-    found = take_figures(strides, angles, oriented, feet).parameters
+    oriented = Orientations(truth.t_s, truth.rate_hz, truth.q, dict.fromkeys(truth.q, mask), "truth")
+    result = take_figures(strides, angles, oriented, feet).parameters
     standing = {k: float(np.degrees(v)) for k, v in truth.zero_offset.items()}
-    return cycle_curves(angles, strides), found, standing
+    return cycle_curves(angles, strides), result, standing
 
 
 @cache
 def controls() -> Norms:
-    """Six healthy walks as a clinic's own controls: what the simulator's healthy walker does."""
+    """Six simulated healthy walks as own controls."""
     people = [
         ControlSession(f"c{seed}", 40.0, None, session("healthy", seed)[1], {}) for seed in (1, 2, 3, 4, 6, 7)
     ]
@@ -60,8 +60,8 @@ def controls() -> Norms:
 
 def raised(name: str, *, goniometer: bool = True) -> set[tuple[str, str | None]]:
     curves, parameters, standing = session(name)
-    found = judge_flags(curves, parameters, standing if goniometer else None, 1.7, controls())
-    return {(f.name, f.side) for f in found if f.exceeded}
+    flags = judge_flags(curves, parameters, standing if goniometer else None, 1.7, controls())
+    return {(f.name, f.side) for f in flags if f.exceeded}
 
 
 @pytest.mark.slow
@@ -106,9 +106,9 @@ def test_without_a_goniometer_levels_are_not_judged_but_sides_are() -> None:
 
 def test_values_are_those_of_the_patient() -> None:
     curves, parameters, standing = session("stiff_knee")
-    found: dict[tuple[str, str | None], Flag] = {
+    result: dict[tuple[str, str | None], Flag] = {
         (f.name, f.side): f for f in judge_flags(curves, parameters, standing, 1.7)
     }
     # as the walker was made: knee 60.3 right, 39.9 left, difference 20.4
-    assert found["stiff_knee", "left"].value == pytest.approx(20.4, abs=3.0)
-    assert found["low_knee_flexion_swing", "left"].value == pytest.approx(39.9, abs=2.0)
+    assert result["stiff_knee", "left"].value == pytest.approx(20.4, abs=3.0)
+    assert result["low_knee_flexion_swing", "left"].value == pytest.approx(39.9, abs=2.0)

@@ -1,4 +1,4 @@
-"""Values against limits, by hand: which side, which zero, which limit, and what cannot be said."""
+"""Values against limits, by hand: side, zero, limit, and cases without a statement."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def sides(
     ]
 
 
-def flag(found: tuple[Flag, ...], name: str, side: Side | None) -> Flag:
-    (one,) = (f for f in found if f.name == name and f.side == side)
+def flag(result: tuple[Flag, ...], name: str, side: Side | None) -> Flag:
+    (one,) = (f for f in result if f.name == name and f.side == side)
     return one
 
 
@@ -62,8 +62,8 @@ def test_every_rule_names_its_source_and_says_whether_it_was_read() -> None:
 
 
 def test_a_stiff_knee_is_found_by_the_other_knee() -> None:
-    found = judge_flags(curves({"knee_flexion": (40.0, 58.0)}), [])
-    left, right = (flag(found, "stiff_knee", s) for s in SIDES)
+    flags = judge_flags(curves({"knee_flexion": (40.0, 58.0)}), [])
+    left, right = (flag(flags, "stiff_knee", s) for s in SIDES)
     assert (left.exceeded, right.exceeded) == (True, False)
     assert left.value == pytest.approx(18.0)
     assert right.value == pytest.approx(-18.0)
@@ -73,8 +73,8 @@ def test_a_stiff_knee_is_found_by_the_other_knee() -> None:
 
 def test_a_knee_that_stands_bent_is_not_stiff_once_the_goniometer_says_so() -> None:
     bent = curves({"knee_flexion": (40.0, 58.0)})
-    found = judge_flags(bent, [], {"knee_flexion_l": 12.0, "knee_flexion_r": 0.0})
-    left = flag(found, "stiff_knee", "left")
+    flags = judge_flags(bent, [], {"knee_flexion_l": 12.0, "knee_flexion_r": 0.0})
+    left = flag(flags, "stiff_knee", "left")
     assert (left.exceeded, left.zero, left.note) == (False, "anatomical", None)
     assert left.value == pytest.approx(6.0)
     half = flag(judge_flags(bent, [], {"knee_flexion_l": 12.0}), "stiff_knee", "left")
@@ -102,17 +102,17 @@ def test_levels_are_judged_from_the_anatomical_zero_only(
     assert (blind.exceeded, blind.marked, blind.reason) == (None, False, "angle_zero_standing")
     assert blind.value == pytest.approx(angle - 4.0)
     assert blind.zero == "standing"
-    known = flag(judge_flags(walked, [], {f"{variable}_l": 4.0}), name, "left")
-    assert (known.exceeded, known.marked, known.zero) == (exceeded, marked, "anatomical")
-    assert known.value == pytest.approx(angle)
+    known_flag = flag(judge_flags(walked, [], {f"{variable}_l": 4.0}), name, "left")
+    assert (known_flag.exceeded, known_flag.marked, known_flag.zero) == (exceeded, marked, "anatomical")
+    assert known_flag.value == pytest.approx(angle)
 
 
 def test_hip_hiking_is_two_standard_deviations_of_a_single_side_above_the_norm() -> None:
     """0.35 + 2 · 1.63: the 1.10 of the table is of the mean of both sides, where one side's rise is lost."""
-    found = judge_flags(curves({"pelvis_obliquity": (3.7, -3.7)}), [])
-    left = flag(found, "hip_hiking", "left")
+    flags = judge_flags(curves({"pelvis_obliquity": (3.7, -3.7)}), [])
+    left = flag(flags, "hip_hiking", "left")
     assert left.limit == pytest.approx(3.61, abs=0.01)
-    assert (left.exceeded, flag(found, "hip_hiking", "right").exceeded) == (True, False)
+    assert (left.exceeded, flag(flags, "hip_hiking", "right").exceeded) == (True, False)
     assert WBDS in left.source
 
 
@@ -120,11 +120,14 @@ def test_ranges_compare_without_any_zero() -> None:
     swing = np.zeros((10, 101))
     swing[:, 72] = np.radians(60.0)
     stiff = swing * 0.8
-    made = curves({"knee_flexion": (0.0, 0.0)})
-    made = CycleCurves(
-        {"knee_flexion": {"left": stiff, "right": swing}}, made.stride_index, made.used, made.foot_off_pct
+    cycle_curves = curves({"knee_flexion": (0.0, 0.0)})
+    cycle_curves = CycleCurves(
+        {"knee_flexion": {"left": stiff, "right": swing}},
+        cycle_curves.stride_index,
+        cycle_curves.used,
+        cycle_curves.foot_off_pct,
     )
-    left = flag(judge_flags(made, []), "knee_range_asymmetry", "left")
+    left = flag(judge_flags(cycle_curves, []), "knee_range_asymmetry", "left")
     assert left.value == pytest.approx(12.0)
     assert left.limit == pytest.approx(2 * 3.77)
     assert (left.exceeded, left.zero, left.note) == (True, None, None)
@@ -132,9 +135,9 @@ def test_ranges_compare_without_any_zero() -> None:
 
 def test_a_ratio_belongs_to_the_larger_side() -> None:
     steps = sides("step_length_m", 0.50, 0.56)
-    found = flag(judge_flags(None, steps), "step_length_asymmetry", "right")
-    assert (found.exceeded, found.verified, found.note) == (True, False, None)
-    assert found.value == pytest.approx(1.12)
+    result = flag(judge_flags(None, steps), "step_length_asymmetry", "right")
+    assert (result.exceeded, result.verified, result.note) == (True, False, None)
+    assert result.value == pytest.approx(1.12)
     times = sides("stance_time_s", 0.70, 0.71, "s") + sides("swing_time_s", 0.40, 0.39, "s")
     even = judge_flags(None, times)
     assert flag(even, "stance_asymmetry", "right").exceeded is False
@@ -143,9 +146,11 @@ def test_a_ratio_belongs_to_the_larger_side() -> None:
 
 
 def test_three_strides_of_a_side_are_held_against_no_limit() -> None:
-    found = flag(judge_flags(None, sides("step_length_m", 0.50, 0.70, n=3)), "step_length_asymmetry", "right")
-    assert (found.exceeded, found.reason) == (None, "too_few_strides")
-    assert found.value == pytest.approx(1.4)
+    result = flag(
+        judge_flags(None, sides("step_length_m", 0.50, 0.70, n=3)), "step_length_asymmetry", "right"
+    )
+    assert (result.exceeded, result.reason) == (None, "too_few_strides")
+    assert result.value == pytest.approx(1.4)
     foot = sides("foot_pitch_ic_deg", -9.0, 20.0, "deg", n=3)
     assert flag(judge_flags(None, foot), "flat_contact", "left").reason == "too_few_strides"
     stiff = flag(judge_flags(curves({"knee_flexion": (20.0, 60.0)}, strides=3), []), "stiff_knee", "left")
@@ -158,28 +163,33 @@ def test_a_difference_that_the_strides_leave_open_is_beyond_no_limit() -> None:
         judge_flags(None, sides("step_length_m", 0.50, 0.60, sd=0.2)), "step_length_asymmetry", "right"
     )
     assert (open_.exceeded, open_.marked, open_.reason) == (None, False, "sides_alike")
-    within = flag(
+    inside = flag(
         judge_flags(None, sides("step_length_m", 0.50, 0.52, sd=0.2)), "step_length_asymmetry", "right"
     )
-    assert within.exceeded is False
+    assert inside.exceeded is False
 
 
 def test_a_step_of_no_length_has_no_ratio() -> None:
-    found = flag(judge_flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
-    assert (found.value, found.exceeded, found.reason) == (None, None, "near_zero")
+    result = flag(judge_flags(None, sides("step_length_m", 0.5, -0.01)), "step_length_asymmetry", None)
+    assert (result.value, result.exceeded, result.reason) == (None, None, "near_zero")
 
 
 def test_circumduction_is_held_against_own_controls_or_nothing() -> None:
     """No table knows how far healthy feet swing out: limits are own controls'."""
     wide = sides("circumduction_m", 0.12, 0.03)
-    alone = flag(judge_flags(None, wide), "circumduction", "left")
-    assert (alone.value, alone.limit, alone.exceeded, alone.reason) == (0.12, None, None, "no_controls")
+    single_flag = flag(judge_flags(None, wide), "circumduction", "left")
+    assert (single_flag.value, single_flag.limit, single_flag.exceeded, single_flag.reason) == (
+        0.12,
+        None,
+        None,
+        "no_controls",
+    )
     people = [
         ControlSession(f"c{i}", 40.0, "male", sides("circumduction_m", 0.02 + 0.002 * i, 0.03), {})
         for i in range(6)
     ]
-    found = judge_flags(None, wide, controls=control_group(people).norms())
-    left, right = (flag(found, "circumduction", s) for s in SIDES)
+    flags = judge_flags(None, wide, controls=control_group(people).norms())
+    left, right = (flag(flags, "circumduction", s) for s in SIDES)
     assert left.limit is not None
     assert 0.03 < left.limit < 0.04
     assert (left.exceeded, right.exceeded, left.reason) == (True, False, None)
@@ -205,15 +215,15 @@ def test_limits_of_healthy_adults_are_those_of_adults_at_this_speed(name: str) -
 
 @pytest.mark.parametrize("speed_mps", [0.15, 1.75])
 def test_limits_of_healthy_adults_are_not_applied_at_a_speed_at_which_none_walked(speed_mps: float) -> None:
-    found = walked_at(speed_mps)
+    result = walked_at(speed_mps)
     for rule in RULES:
         if rule.adults != "limit":
             continue
         for side in SIDES:
-            of = flag(found, rule.name, side)
-            assert (of.exceeded, of.limit, of.certain) == (None, None, False)
-            assert of.value is None or of.reason == "no_speed_matched_norm"
-    stiff = flag(found, "stiff_knee", "left")
+            source = flag(result, rule.name, side)
+            assert (source.exceeded, source.limit, source.certain) == (None, None, False)
+            assert source.value is None or source.reason == "no_speed_matched_norm"
+    stiff = flag(result, "stiff_knee", "left")
     assert (stiff.exceeded, stiff.note) == (True, "sides_stand_differently"), "its limit is of patients"
 
 
@@ -227,10 +237,10 @@ def test_children_are_not_held_against_adult_norms() -> None:
 
 
 def test_nothing_measured_gives_reasons_and_no_flag() -> None:
-    found = judge_flags(None, [])
-    assert {f.exceeded for f in found} == {None}
-    assert all(f.reason for f in found)
-    assert {f.name for f in found} == {r.name for r in RULES}
+    flags = judge_flags(None, [])
+    assert {f.exceeded for f in flags} == {None}
+    assert all(f.reason for f in flags)
+    assert {f.name for f in flags} == {r.name for r in RULES}
     none = curves({"knee_flexion": (50.0, 50.0)}, strides=0)
     assert flag(judge_flags(none, []), "stiff_knee", "left").reason == "no_strides"
 

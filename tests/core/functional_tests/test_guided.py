@@ -90,23 +90,23 @@ def test_a_timed_up_and_go_starts_and_stops_by_itself(segment: Segment) -> None:
 
 @pytest.mark.slow
 def test_any_blocks_give_the_same_bits() -> None:
-    one, *others = (followed(pelvis_tug(), "tug", size)[-1] for size in (1, 10, 37))
+    one, *remaining = (followed(pelvis_tug(), "tug", size)[-1] for size in (1, 10, 37))
     assert one.final
-    for other in others:
-        assert means(other.result) == means(one.result)
-        assert (other.start_s, other.end_s) == (one.start_s, one.end_s)
+    for second in remaining:
+        assert means(second.result) == means(one.result)
+        assert (second.start_s, second.end_s) == (one.start_s, one.end_s)
 
 
 def test_five_rises_are_counted_and_end_seated() -> None:
     take = pelvis_rises()
     guided = GuidedTest("five_sit_to_stand", ("pelvis",), take.rate_hz)
-    counted = []
+    counted_strides = []
     for block in blocks(take, 10):
         guided.push(block)
         view = guided.advance()
-        if view.phase == "running" and view.rises not in counted:
-            counted.append(view.rises)
-    assert counted == [0, 1, 2, 3, 4, 5]
+        if view.phase == "running" and view.rises not in counted_strides:
+            counted_strides.append(view.rises)
+    assert counted_strides == [0, 1, 2, 3, 4, 5]
     file = measure_chair_rises(follow_trunk(take))
     assert means(guided.view.result) == pytest.approx(means(file), abs=REFINED_S, rel=0.01)
 
@@ -151,13 +151,15 @@ def test_a_repetition_drops_what_was() -> None:
     for block in blocks(take, 10):
         guided.push(replace(block, first=block.first + n))
         guided.advance()
-    again = guided.view
-    assert again.final
-    assert again.start_s is not None
+    second_view = guided.view
+    assert second_view.final
+    assert second_view.start_s is not None
     file = measure_tug(follow_trunk(take))
     assert file.start_s is not None
-    assert again.start_s - n / take.rate_hz == pytest.approx(file.start_s, abs=0.05)
-    assert means(again.result)["tug_duration_s"] == pytest.approx(means(file)["tug_duration_s"], abs=0.05)
+    assert second_view.start_s - n / take.rate_hz == pytest.approx(file.start_s, abs=0.05)
+    assert means(second_view.result)["tug_duration_s"] == pytest.approx(
+        means(file)["tug_duration_s"], abs=0.05
+    )
 
 
 def test_a_person_corrects_start_and_end() -> None:
@@ -173,20 +175,20 @@ def test_a_person_corrects_start_and_end() -> None:
     assert means(view.result) == pytest.approx(means(file), abs=REFINED_S, rel=0.01)
 
 
-def still(seconds: float, seed: int = 1, *worn: Segment) -> UniformRecording:
-    """Somebody who stands and sways a little."""
+def still(seconds: float, seed: int = 1, *segments: Segment) -> UniformRecording:
+    """Person standing with a little sway."""
     n = round(seconds * RATE)
     draw = np.random.default_rng(seed)
     t_s = np.arange(n) / RATE
     sway = 0.05 * np.sin(2.0 * np.pi * 0.4 * t_s)[:, None] * np.array([1.0, 0.0, 0.5])
     base = wear(tug()[0], "pelvis")
-    here = np.ones(n, np.bool_)
+    mask = np.ones(n, np.bool_)
     acc = np.array([0.0, GRAVITY, 0.0]) + sway + 0.01 * draw.standard_normal((n, 3))
     x = replace(
-        base.sensors["pelvis"], acc=acc, gyr=0.002 * draw.standard_normal((n, 3)), mag=None, valid=here,
-        interpolated=~here,
+        base.sensors["pelvis"], acc=acc, gyr=0.002 * draw.standard_normal((n, 3)), mag=None, valid=mask,
+        interpolated=~mask,
     )  # fmt: skip
-    sensors = {s: replace(x, device_id=s) for s in worn or ("pelvis",)}
+    sensors = {s: replace(x, device_id=s) for s in segments or ("pelvis",)}
     return replace(base, t_s=t_s, rate_hz=RATE, sensors=sensors)
 
 
@@ -234,7 +236,7 @@ def test_a_step_begins_quiet_standing_anew() -> None:
 
 
 def strides_of_a_walk(start_s: float, end_s: float) -> tuple[list[LiveStride], list[GaitEvent]]:
-    """Strides of 1.3 m and 1.1 s of both feet, told half a second late."""
+    """Strides of 1.3 m and 1.1 s of both feet, reported half a second late."""
     strides: list[LiveStride] = []
     events: list[GaitEvent] = []
     for side, lag in zip(SIDES, (0.0, 0.55), strict=True):
@@ -267,9 +269,9 @@ def test_a_walk_ends_by_itself(protocol: Protocol, seconds: float, name: str, ex
     guided = GuidedTest(protocol, ("foot_l", "foot_r"), RATE)
     phases: list[str] = []
     for block in blocks(take, 10):
-        here = range(block.first, block.first + len(block))
-        new = [x for x in strides if round(x.detected_s * RATE) in here]
-        guided.push(block, new, [x for x in events if round(x.detected_s * RATE) in here])
+        place = range(block.first, block.first + len(block))
+        new = [x for x in strides if round(x.detected_s * RATE) in place]
+        guided.push(block, new, [x for x in events if round(x.detected_s * RATE) in place])
         view = guided.advance()
         if not phases or phases[-1] != view.phase:
             phases.append(view.phase)

@@ -20,9 +20,9 @@ QUIET = RecordingSetup(noise=None)
 
 
 def measure(
-    made: SwaySimulation, segment: Segment = "pelvis", limits: GivenLimits | None = None
+    result: SwaySimulation, segment: Segment = "pelvis", limits: GivenLimits | None = None
 ) -> FunctionalTest:
-    take = synchronise(made.recording)
+    take = synchronise(result.recording)
     return measure_sway(replace(take, sensors={segment: take.sensors[segment]}), limits)
 
 
@@ -33,8 +33,8 @@ def means(test: FunctionalTest) -> dict[str, float | None]:
 @pytest.mark.parametrize("segment", ["pelvis", "chest"])
 @pytest.mark.parametrize(("setup", "within"), [(QUIET, 0.02), (RecordingSetup(), 0.05)])
 def test_figures_are_those_of_the_pendulum(segment: Segment, setup: RecordingSetup, within: float) -> None:
-    made = simulate_sway(seed=3, setup=setup)
-    truth, got = made.truth[segment], means(measure(made, segment))
+    sway = simulate_sway(seed=3, setup=setup)
+    truth, got = sway.truth[segment], means(measure(sway, segment))
     seconds = got["sway_duration_s"]
     assert seconds == pytest.approx(40.0, abs=1.0)
     assert seconds is not None
@@ -45,8 +45,8 @@ def test_figures_are_those_of_the_pendulum(segment: Segment, setup: RecordingSet
 
 
 def test_a_circle_has_its_path_velocity_and_frequency() -> None:
-    made = simulate_sway(Sway(0.006, 0.006, 0.8), setup=QUIET)
-    radius, got = made.truth["pelvis"].forward, means(measure(made))
+    sway = simulate_sway(Sway(0.006, 0.006, 0.8), setup=QUIET)
+    radius, got = sway.truth["pelvis"].forward, means(measure(sway))
     seconds = got["sway_duration_s"]
     assert seconds is not None
     assert got["sway_path_mps2"] == pytest.approx(2.0 * pi * radius * 0.8 * seconds, rel=0.02)
@@ -64,21 +64,21 @@ def test_twice_the_sway_has_twice_the_size_and_four_times_the_area() -> None:
 
 
 def test_a_short_standing_is_withheld() -> None:
-    found = measure(simulate_sway(Sway(duration_s=15.0), setup=QUIET))
-    assert {p.reason for p in found.parameters} == {"standing_too_short"}
-    assert found.segments == ()
+    measurement = measure(simulate_sway(Sway(duration_s=15.0), setup=QUIET))
+    assert {p.reason for p in measurement.parameters} == {"standing_too_short"}
+    assert measurement.segments == ()
 
 
 def test_a_person_chooses_the_part() -> None:
-    found = measure(simulate_sway(setup=QUIET), limits=GivenLimits(5.0, 30.0))
-    assert (found.start_s, found.end_s, found.corrected) == (5.0, 30.0, True)
+    measurement = measure(simulate_sway(setup=QUIET), limits=GivenLimits(5.0, 30.0))
+    assert (measurement.start_s, measurement.end_s, measurement.corrected) == (5.0, 30.0, True)
 
 
 def test_noise_of_the_sensor_is_no_sway() -> None:
     still = Sway(0.0003, 0.0003, 0.5)
     loud = simulate_sway(still, setup=RecordingSetup(noise=MEMS.times(10.0)))
-    found = measure(loud)
-    withheld = {p.name for p in found.parameters if p.reason == "noise_dominated"}
+    measurement = measure(loud)
+    withheld = {p.name for p in measurement.parameters if p.reason == "noise_dominated"}
     assert {"sway_jerk_m2ps5", "sway_path_mps2", "sway_mean_frequency_hz"} <= withheld
     quiet = measure(simulate_sway(still, setup=QUIET))
     assert {p.reason for p in quiet.parameters} == {None}

@@ -28,18 +28,18 @@ WORN: tuple[Segment, ...] = ("pelvis", "chest")
 
 @keep
 def tug(patient: str = "healthy", seed: int = 1, left: bool = True) -> tuple[UniformRecording, ChairTruth]:
-    made = simulate_tug(patient, seed, setup=replace(ON_SKIN, worn=WORN), left=left)
-    return synchronise(made.recording), made.truth
+    simulation = simulate_tug(patient, seed, setup=replace(ON_SKIN, worn=WORN), left=left)
+    return synchronise(simulation.recording), simulation.truth
 
 
 @keep
 def rises(
     patient: str = "elderly", repetitions: int = 5, pause_s: float = 0.3
 ) -> tuple[UniformRecording, ChairTruth]:
-    made = simulate_chair_rises(
+    chair_rises = simulate_chair_rises(
         patient, 1, setup=replace(ON_SKIN, worn=WORN), repetitions=repetitions, pause_s=pause_s
     )
-    return synchronise(made.recording), made.truth
+    return synchronise(chair_rises.recording), chair_rises.truth
 
 
 def wear(take: UniformRecording, segment: Segment) -> UniformRecording:
@@ -61,18 +61,18 @@ def reasons(test: FunctionalTest) -> set[str | None]:
 
 @pytest.mark.parametrize("segment", WORN)
 def test_the_segments_follow_each_other_and_are_the_true_ones(segment: Segment) -> None:
-    found = measure_tug(trunk(segment))
+    result = measure_tug(trunk(segment))
     truth = tug()[1]
     names = ("sit_to_stand", "walk_out", "turn", "walk_back", "turn_to_sit")
-    assert tuple(s.name for s in found.segments) == names
-    for before, after in zip(found.segments[:-1], found.segments[1:], strict=True):
-        assert before.end_s == after.start_s
+    assert tuple(s.name for s in result.segments) == names
+    for initial, final in zip(result.segments[:-1], result.segments[1:], strict=True):
+        assert initial.end_s == final.start_s
     true = {p.kind: p.end_s - p.start_s for p in truth.segments}
-    got = means(found)
+    got = means(result)
     for name in (*names, "final_turn", "stand_to_sit"):
         assert got[f"tug_{name}_s"] == pytest.approx(true[name], abs=0.2)
     assert got["tug_duration_s"] == pytest.approx(truth.duration_s, abs=0.1)
-    assert found.sensor == segment
+    assert result.sensor == segment
 
 
 def test_the_pelvis_is_asked_before_the_chest() -> None:
@@ -89,17 +89,17 @@ def test_turns_have_their_angle_and_direction() -> None:
 
 
 def test_a_person_may_say_when_it_began_and_ended() -> None:
-    free, given = measure_tug(trunk()), measure_tug(trunk(), GivenLimits(3.5, 18.5))
-    assert given.corrected
+    free, inputs = measure_tug(trunk()), measure_tug(trunk(), GivenLimits(3.5, 18.5))
+    assert inputs.corrected
     assert not free.corrected
-    got, was = means(given), means(free)
+    got, was = means(inputs), means(free)
     assert got["tug_duration_s"] == pytest.approx(15.0)
     assert got["tug_turn_s"] == was["tug_turn_s"]
     assert free.start_s is not None
-    rise, before = got["tug_sit_to_stand_s"], was["tug_sit_to_stand_s"]
+    rise, initial = got["tug_sit_to_stand_s"], was["tug_sit_to_stand_s"]
     assert rise is not None
-    assert before is not None
-    assert rise - before == pytest.approx(free.start_s - 3.5)
+    assert initial is not None
+    assert rise - initial == pytest.approx(free.start_s - 3.5)
 
 
 def test_limits_make_sense() -> None:
@@ -131,20 +131,20 @@ def test_nobody_rises_while_walking() -> None:
 
 def test_rises_of_a_chest_are_those_of_the_day() -> None:
     day = simulate_day((PostureHold("sit", 5.0), PostureHold("stand", 4.0), PostureHold("sit", 5.0)), seed=2)
-    found = find_changes(follow_trunk(synchronise(day.recording)))
-    assert [c.kind for c in found] == ["sit_to_stand", "stand_to_sit"]
-    assert [c.height_m for c in found] == pytest.approx([0.4, -0.4], abs=0.1)
+    changes = find_changes(follow_trunk(synchronise(day.recording)))
+    assert [c.kind for c in changes] == ["sit_to_stand", "stand_to_sit"]
+    assert [c.height_m for c in changes] == pytest.approx([0.4, -0.4], abs=0.1)
 
 
 @pytest.mark.parametrize("segment", WORN)
 def test_five_rises(segment: Segment) -> None:
     take, truth = rises()
-    found = measure_chair_rises(follow_trunk(wear(take, segment)))
-    got = means(found)
+    chair_rises = measure_chair_rises(follow_trunk(wear(take, segment)))
+    got = means(chair_rises)
     assert got["five_sit_to_stand_s"] == pytest.approx(truth.duration_s, abs=0.1)
     standing = truth.changes[8].end_s - truth.changes[0].start_s
     assert got["five_sit_to_stand_standing_s"] == pytest.approx(standing, abs=0.1)
-    assert [s.name for s in found.segments] == ["sit_to_stand", "stand_to_sit"] * 5
+    assert [s.name for s in chair_rises.segments] == ["sit_to_stand", "stand_to_sit"] * 5
     assert got["chair_rise_count"] == 5.0
     one = np.mean([c.end_s - c.start_s for c in truth.changes[::2]])
     assert got["chair_rise_s"] == pytest.approx(one, abs=0.1)

@@ -44,19 +44,19 @@ def reasons(test: FunctionalTest) -> set[str | None]:
 
 
 def test_the_middle_metres_are_timed() -> None:
-    found = measure_ten_metres(walk(12.0))
-    got = means(found)
+    ten_metres = measure_ten_metres(walk(12.0))
+    got = means(ten_metres)
     assert got["walk_10m_speed_mps"] == pytest.approx(1.2, rel=0.03)
     assert got["walk_10m_distance_m"] == pytest.approx(10.0, abs=0.7)
-    assert [s.name for s in found.segments] == ["speeding_up", "timed_metres", "slowing_down"]
-    assert found.segments[0].duration_s == pytest.approx(2.0 / 1.2, abs=0.6)
+    assert [s.name for s in ten_metres.segments] == ["speeding_up", "timed_metres", "slowing_down"]
+    assert ten_metres.segments[0].duration_s == pytest.approx(2.0 / 1.2, abs=0.6)
 
 
 def test_a_turn_ends_the_lane() -> None:
     turn = Turn(15.0, 17.0, 3.1, 2.0)
-    found = measure_ten_metres(walk(24.0, turns=(turn,)))
-    assert (found.start_s, found.end_s) == (17.0, 29.0)
-    got = means(found)
+    ten_metres = measure_ten_metres(walk(24.0, turns=(turn,)))
+    assert (ten_metres.start_s, ten_metres.end_s) == (17.0, 29.0)
+    got = means(ten_metres)
     assert got["walk_10m_speed_mps"] == pytest.approx(1.2, rel=0.03)
 
 
@@ -69,18 +69,18 @@ def test_a_short_walk_and_one_without_lengths_say_why() -> None:
 
 
 def test_six_minutes_with_slowing() -> None:
-    found = measure_six_minutes(walk(370.0, (1.2, 0.9)))
-    got = means(found)
+    six_minutes = measure_six_minutes(walk(370.0, (1.2, 0.9)))
+    got = means(six_minutes)
     assert got["walk_6min_distance_m"] == pytest.approx(185.0 * 1.2 + 175.0 * 0.9, rel=0.01)
     assert got["walk_6min_first_mps"] == pytest.approx(1.2, rel=0.02)
     assert got["walk_6min_last_mps"] == pytest.approx(0.9, rel=0.02)
     assert got["walk_6min_slowing_pct"] == pytest.approx(25.0, abs=2.0)
     assert got["walk_6min_standing_s"] == pytest.approx(0.0, abs=0.1)
-    assert len(found.segments) == 6
+    assert len(six_minutes.segments) == 6
 
 
 def test_five_minutes_are_too_short_unless_a_person_says_so() -> None:
     assert reasons(measure_six_minutes(walk(300.0))) == {"walk_too_short"}
-    found = measure_six_minutes(walk(300.0), GivenLimits(5.0, 300.0))
-    assert found.corrected
-    assert means(found)["walk_6min_distance_m"] == pytest.approx(295.0 * 1.2, rel=0.02)
+    six_minutes = measure_six_minutes(walk(300.0), GivenLimits(5.0, 300.0))
+    assert six_minutes.corrected
+    assert means(six_minutes)["walk_6min_distance_m"] == pytest.approx(295.0 * 1.2, rel=0.02)

@@ -38,15 +38,15 @@ def all_valid(n: int) -> Bools:
 
 def test_it_follows_a_motion_without_acceleration_exactly() -> None:
     q, rate, force = motion(2000)
-    found = estimate_orientation(q[0], 0, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
-    assert angle_between(found, q).max() < 1e-6
+    orientation = estimate_orientation(q[0], 0, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
+    assert angle_between(orientation, q).max() < 1e-6
 
 
 @pytest.mark.parametrize("at", [0, 700, 1999])
 def test_it_starts_from_any_sample_of_the_take(at: int) -> None:
     q, rate, force = motion(2000, seed=3)
-    found = estimate_orientation(q[at], at, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
-    assert angle_between(found, q).max() < 1e-6
+    orientation = estimate_orientation(q[at], at, rate, force, all_valid(2000), RATE, GRAVITY, PARAMS)
+    assert angle_between(orientation, q).max() < 1e-6
 
 
 @pytest.mark.slow
@@ -96,8 +96,10 @@ def test_a_small_gyro_bias_tilts_by_bias_over_gain() -> None:
 def test_no_gain_is_pure_integration() -> None:
     q, rate, _ = motion(500)
     wild = np.random.default_rng(0).standard_normal((500, 3)) * 50
-    found = estimate_orientation(q[0], 0, rate, wild, all_valid(500), RATE, GRAVITY, AttitudeParams(kp=0.0))
-    assert angle_between(found, q).max() < 1e-9
+    orientation = estimate_orientation(
+        q[0], 0, rate, wild, all_valid(500), RATE, GRAVITY, AttitudeParams(kp=0.0)
+    )
+    assert angle_between(orientation, q).max() < 1e-9
 
 
 def test_inside_a_gap_the_orientation_is_held_and_after_it_the_tilt_is_relearnt() -> None:
@@ -106,11 +108,11 @@ def test_inside_a_gap_the_orientation_is_held_and_after_it_the_tilt_is_relearnt(
     valid[1000:1400] = False
     rate, force = rate.copy(), force.copy()
     rate[1000:1400], force[1000:1400] = rate[999], force[999]
-    found = estimate_orientation(q[0], 0, rate, force, valid, RATE, GRAVITY, PARAMS)
-    assert np.array_equal(found[1000:1400], np.tile(found[999], (400, 1)))
-    assert angle_between(found[:1000], q[:1000]).max() < 1e-6
+    orientation = estimate_orientation(q[0], 0, rate, force, valid, RATE, GRAVITY, PARAMS)
+    assert np.array_equal(orientation[1000:1400], np.tile(orientation[999], (400, 1)))
+    assert angle_between(orientation[:1000], q[:1000]).max() < 1e-6
     up = np.array([0.0, 0.0, 1.0])
-    tilt = rotate(conjugate(found), up) - rotate(conjugate(q), up)
+    tilt = rotate(conjugate(orientation), up) - rotate(conjugate(q), up)
     assert np.degrees(np.linalg.norm(tilt[1450:], axis=1).max()) < 1.0
 
 
@@ -118,26 +120,26 @@ def test_a_first_stretch_before_a_gap_is_estimated_backwards() -> None:
     q, rate, force = motion(3000, seed=2)
     valid = all_valid(3000)
     valid[1000:1200] = False
-    found = estimate_orientation(q[2500], 2500, rate, force, valid, RATE, GRAVITY, PARAMS)
-    assert angle_between(found[1200:], q[1200:]).max() < 1e-6
+    orientation = estimate_orientation(q[2500], 2500, rate, force, valid, RATE, GRAVITY, PARAMS)
+    assert angle_between(orientation[1200:], q[1200:]).max() < 1e-6
     up = np.array([0.0, 0.0, 1.0])
-    tilt = rotate(conjugate(found), up) - rotate(conjugate(q), up)
+    tilt = rotate(conjugate(orientation), up) - rotate(conjugate(q), up)
     assert np.degrees(np.linalg.norm(tilt[:900], axis=1).max()) < 1.0
 
 
 def test_a_sensor_that_never_was_valid_keeps_its_start() -> None:
     _, rate, force = motion(50)
-    found = estimate_orientation(LEVEL, 10, rate, force, np.zeros(50, bool), RATE, GRAVITY, PARAMS)
-    assert np.array_equal(found, np.tile(LEVEL, (50, 1)))
+    orientation = estimate_orientation(LEVEL, 10, rate, force, np.zeros(50, bool), RATE, GRAVITY, PARAMS)
+    assert np.array_equal(orientation, np.tile(LEVEL, (50, 1)))
 
 
 def test_norm_stays_one_and_the_result_is_deterministic() -> None:
     _, rate, force = motion(3000, seed=5)
     noisy = force + np.random.default_rng(0).standard_normal(force.shape) * 5
-    once = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
-    again = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
-    assert np.array_equal(once, again)
-    assert np.abs(np.linalg.norm(once, axis=1) - 1).max() < 1e-9
+    orientation = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
+    second_orientation = estimate_orientation(LEVEL, 0, rate, noisy, all_valid(3000), RATE, GRAVITY, PARAMS)
+    assert np.array_equal(orientation, second_orientation)
+    assert np.abs(np.linalg.norm(orientation, axis=1) - 1).max() < 1e-9
 
 
 def test_a_large_turn_between_two_samples_is_exact() -> None:

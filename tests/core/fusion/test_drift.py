@@ -1,4 +1,4 @@
-"""Which sensor is told of when relative headings are brought back."""
+"""Sensors named in the notice on corrected relative headings."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from tests.helpers.walks import simulated
 def test_of_two_feet_alone_the_last_digits_do_not_choose(seed: int) -> None:
     """Their reference is half way between them, so that both turn from it by the same angle."""
     rate_hz, n = 50.0, 6000
-    found = calibrate(simulated("comfortable", 2)[0]).calibration
-    walk = replace(found, walking=((0.0, n / rate_hz),))
+    calibration = calibrate(simulated("comfortable", 2)[0]).calibration
+    walk = replace(calibration, walking=((0.0, n / rate_hz),))
     rng, turn = np.random.default_rng(seed), np.linspace(0.0, radians(10.0), n)
     feet: tuple[Segment, Segment] = ("foot_l", "foot_r")
     headings = about(2, turn + rng.uniform(-3.0, 3.0)), about(2, -turn)

@@ -55,7 +55,7 @@ def track(sizes: int, params: AttitudeParams | None = None) -> Floats:
 
 def test_it_is_the_filter_of_a_file_turned_into_the_segment() -> None:
     acc, gyr, valid = measured()
-    found = track(N)
+    result = track(N)
     for place, (sensor, mount) in enumerate(zip((2, 0), MOUNTS, strict=True)):
         turn = from_matrix(mount.R_segment_sensor)
         state = AttitudeState(from_matrix(R_NEUTRAL @ mount.R_segment_sensor), np.zeros(3))
@@ -69,7 +69,7 @@ def test_it_is_the_filter_of_a_file_turned_into_the_segment() -> None:
             AttitudeParams(),
         )
         expected = multiply(q, conjugate(turn))
-        assert np.abs(np.sum(found[:, place] * expected, axis=1)) == pytest.approx(1.0, abs=1e-12)
+        assert np.abs(np.sum(result[:, place] * expected, axis=1)) == pytest.approx(1.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])
@@ -83,9 +83,9 @@ def test_who_stands_upright_stays_upright() -> None:
     force = rotate(conjugate(q), np.array([0.0, GRAVITY, 0.0]))
     tracker = AttitudeTracker((0,), (mount,), RATE)
     acc, gyr = np.tile(force, (50, 1, 1)), np.tile(BIAS, (50, 1, 1))
-    found = tracker.push(acc, gyr, np.ones((50, 1), np.bool_), no_feet(50))[0][:, 0]
+    frame = tracker.push(acc, gyr, np.ones((50, 1), np.bool_), no_feet(50))[0][:, 0]
     upright = from_matrix(R_NEUTRAL)
-    assert np.abs(found @ upright) == pytest.approx(1.0, abs=1e-12)
+    assert np.abs(frame @ upright) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_its_gains_are_those_of_the_filter() -> None:
@@ -104,7 +104,7 @@ RESTS = SWING.stop + round(RESTED_S * RATE) - 1
 
 
 def swing() -> tuple[Floats, Floats, Bools]:
-    """Signals (n, 1, 3) of a foot, and where it stands (n, 1)."""
+    """Signals (n, 1, 3) of a foot, and its still samples (n, 1)."""
     n = 300
     t = (np.arange(n) - SWING.start + 0.5) / (SWING.stop - SWING.start)
     inside = (t > 0) & (t < 1)
@@ -122,9 +122,9 @@ def track_foot(
     straight = SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0)
     tracker = AttitudeTracker([0], [straight], RATE, feet=1)
     edges = [0, *cuts, len(acc)]
-    found = [tracker.push(acc[a:b], gyr[a:b], valid[a:b], still[a:b]) for a, b in pairwise(edges)]
-    q, known = (np.concatenate(x) for x in zip(*found, strict=True))
-    return q[:, 0], known[:, 0]
+    frames = [tracker.push(acc[a:b], gyr[a:b], valid[a:b], still[a:b]) for a, b in pairwise(edges)]
+    q, reference = (np.concatenate(x) for x in zip(*frames, strict=True))
+    return q[:, 0], reference[:, 0]
 
 
 def off_deg(q: Floats) -> Floats:
@@ -135,29 +135,29 @@ def test_a_foot_that_was_lost_in_swing_is_unknown_until_it_rests() -> None:
     acc, gyr, still = swing()
     valid = np.ones(still.shape, np.bool_)
     valid[110:125] = False
-    q, known = track_foot(acc, gyr, valid, still)
-    np.testing.assert_array_equal(np.flatnonzero(~known), np.arange(110, RESTS))
+    q, known_track = track_foot(acc, gyr, valid, still)
+    np.testing.assert_array_equal(np.flatnonzero(~known_track), np.arange(110, RESTS))
     assert off_deg(q)[RESTS:].max() == pytest.approx(0.0, abs=0.5)
 
 
 def test_a_rest_that_contradicts_it_begins_it_anew_and_is_itself_not_known() -> None:
-    """Nothing was said to be lost, and still the gyroscope did not see all of the movement."""
+    """No loss was reported, yet the gyroscope missed part of the movement."""
     acc, gyr, still = swing()
     gyr[110:115] = gyr[109]
-    q, known = track_foot(acc, gyr, np.ones(still.shape, np.bool_), still)
+    q, known_track = track_foot(acc, gyr, np.ones(still.shape, np.bool_), still)
     assert off_deg(q)[RESTS - 1] > 5.0
-    assert np.flatnonzero(~known).tolist() == [RESTS]
+    assert np.flatnonzero(~known_track).tolist() == [RESTS]
     assert off_deg(q)[RESTS:].max() == pytest.approx(0.0, abs=0.1)
 
 
 def test_a_foot_that_never_rests_is_known_again_when_its_tilt_is_learnt() -> None:
-    once = swing()
-    acc, gyr = (np.concatenate((x,) * 5) for x in once[:2])
+    single = swing()
+    acc, gyr = (np.concatenate((x,) * 5) for x in single[:2])
     valid = np.ones(acc.shape[:2], np.bool_)
     valid[110:125] = False
-    _, known = track_foot(acc, gyr, valid, np.zeros_like(valid))
+    _, known_track = track_foot(acc, gyr, valid, np.zeros_like(valid))
     # 1 / kp = 10 s after the loss
-    np.testing.assert_array_equal(np.flatnonzero(~known), np.arange(110, 1125))
+    np.testing.assert_array_equal(np.flatnonzero(~known_track), np.arange(110, 1125))
 
 
 def test_blocks_do_not_matter_to_a_foot_that_begins_anew() -> None:

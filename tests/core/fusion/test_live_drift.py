@@ -40,18 +40,18 @@ def test_headings_are_held_over_five_minutes_and_turns_are_not_taken_for_drift()
     HeadingHold(("pelvis", "foot_l", "foot_r"), RATE, MOVING).push(held, gyr, valid)
     np.testing.assert_array_equal(held[:, 0], q[:, 0])
 
-    def apart(x: Floats, i: int, at: slice) -> float:
-        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[at, i]) - yaw(x[at, 0])))))))
+    def apart(x: Floats, i: int, position: slice) -> float:
+        return float(np.degrees(np.angle(np.mean(np.exp(1j * (yaw(x[position, i]) - yaw(x[position, 0])))))))
 
     first, last = slice(200, 1600), slice(n - 1600, n - 200)
     for i, rate in ((1, 6.0), (2, -4.0)):
         assert abs(apart(q, i, last) - apart(q, i, first)) > 3.5 * abs(rate)
         assert abs(apart(held, i, last) - apart(held, i, first)) < 3.0
-    again = q.copy()
+    second_duplicate = q.copy()
     hold = HeadingHold(("pelvis", "foot_l", "foot_r"), RATE, MOVING)
     for k in in_blocks(n, 5):
-        hold.push(again[k], gyr[k], valid[k])
-    np.testing.assert_array_equal(again, held)
+        hold.push(second_duplicate[k], gyr[k], valid[k])
+    np.testing.assert_array_equal(second_duplicate, held)
 
 
 def test_a_segment_alone_has_nothing_to_be_held_to() -> None:

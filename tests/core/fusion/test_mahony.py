@@ -34,8 +34,8 @@ def test_warm_compiles_without_a_recording() -> None:
 
 def test_at_standing_every_segment_faces_forward_and_stands_upright() -> None:
     take = calibrated()
-    found = estimate_orientations(take)
-    for segment, q in found.q.items():
+    orientations = estimate_orientations(take)
+    for segment, q in orientations.q.items():
         standing = mean(q[index_window(take.calibration.zero, 100.0)])
         R = angle_between(standing, normalise(_neutral()))
         assert np.degrees(R) < 1.0, segment
@@ -47,11 +47,11 @@ def _neutral() -> Floats:
 
 def test_quaternions_are_unit_finite_and_deterministic() -> None:
     take = calibrated()
-    once, again = estimate_orientations(take), estimate_orientations(take)
-    for segment, q in once.q.items():
+    orientations, second_orientations = estimate_orientations(take), estimate_orientations(take)
+    for segment, q in orientations.q.items():
         assert np.abs(np.linalg.norm(q, axis=1) - 1).max() < 1e-9
-        assert np.array_equal(q, again.q[segment])
-    assert once.engine == "mahony"
+        assert np.array_equal(q, second_orientations.q[segment])
+    assert orientations.engine == "mahony"
 
 
 @pytest.mark.slow
@@ -59,11 +59,11 @@ def test_inclination_follows_the_truth_within_a_degree() -> None:
     """Long axis of the shank against the truth, both relative to standing, over 5 min."""
     recording, truth = simulated("five_minutes")
     take = calibrate(recording)
-    found = estimate_orientations(take)
+    orientations = estimate_orientations(take)
     n = min(len(recording.t_s), len(truth.t_s))
     part = index_window(take.calibration.zero, 100.0)
     for segment in ("shank_l", "shank_r"):
-        ours, true = (np.unwrap(_pitch(q[:n])) for q in (found.q[segment], truth.q[segment]))
+        ours, true = (np.unwrap(_pitch(q[:n])) for q in (orientations.q[segment], truth.q[segment]))
         error = (ours - ours[part].mean()) - (true - true[part].mean())
         assert rms_deg(np.asarray(error)) < 1.0
 
@@ -78,13 +78,13 @@ def _pitch(q: Floats) -> Floats:
 def test_any_mounting_gives_the_same_orientations() -> None:
     recording, _ = simulated("comfortable")
     rng = np.random.default_rng(3)
-    by: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
-    one, other = (
+    by_segment: dict[Segment, Floats] = {s: normalise(rng.standard_normal(4)) for s in recording.sensors}
+    one, other_orientations = (
         estimate_orientations(calibrate(recording)),
-        estimate_orientations(calibrate(turned(recording, by))),
+        estimate_orientations(calibrate(turned(recording, by_segment))),
     )
     for segment, q in one.q.items():
-        assert np.degrees(angle_between(q, other.q[segment]).max()) < 0.1, segment
+        assert np.degrees(angle_between(q, other_orientations.q[segment]).max()) < 0.1, segment
 
 
 @pytest.mark.slow
@@ -133,10 +133,10 @@ def test_a_lost_sensor_is_masked_and_comes_back() -> None:
     recording, truth = simulated("comfortable")
     broken = lost(recording, "shank_l", 15.0, 20.0)
     take = calibrate(broken)
-    found = estimate_orientations(take)
-    assert not found.valid["shank_l"][1500:2000].any()
-    assert found.valid["shank_l"][2000:].all()
-    angles = measure_angles(found, take.calibration.zero)
+    orientations = estimate_orientations(take)
+    assert not orientations.valid["shank_l"][1500:2000].any()
+    assert orientations.valid["shank_l"][2000:].all()
+    angles = measure_angles(orientations, take.calibration.zero)
     knee = angles.angles["knee_flexion_l"]
     assert np.isnan(knee[1500:2000]).all()
     n = min(len(knee), len(truth.t_s))
@@ -151,21 +151,23 @@ def test_a_lost_pelvis_finds_its_heading_again_and_leaves_the_legs_alone() -> No
     whole = estimate_orientations(calibrate(recording))
     turning = np.flatnonzero(calibrate(recording).calibration.turning) / 100.0
     take = calibrate(lost(recording, "pelvis", float(turning[0]) - 0.2, float(turning[0]) + 3.0))
-    found = estimate_orientations(take)
+    orientations = estimate_orientations(take)
     late = slice(round(100 * turning[0]) + 600, round(100 * truth.stands[-1][0]))
     thighs: tuple[Segment, ...] = ("thigh_l", "thigh_r")
     for thigh in thighs:
-        ours, true = (np.exp(1j * (yaw(x.q[thigh]) - yaw(x.q["pelvis"])))[late] for x in (found, whole))
+        ours, true = (
+            np.exp(1j * (yaw(x.q[thigh]) - yaw(x.q["pelvis"])))[late] for x in (orientations, whole)
+        )
         assert abs(np.degrees(np.angle((ours * np.conj(true)).mean()))) < 8.0
-    assert np.degrees(angle_between(found.q["shank_l"], whole.q["shank_l"]).max()) < 5.0
+    assert np.degrees(angle_between(orientations.q["shank_l"], whole.q["shank_l"]).max()) < 5.0
 
 
 def test_feet_alone_are_estimated_as_in_the_full_set() -> None:
     recording, _ = simulated("slow")
-    alone = estimate_orientations(calibrate(only(recording, "foot_l", "foot_r")))
+    single_orientations = estimate_orientations(calibrate(only(recording, "foot_l", "foot_r")))
     full = estimate_orientations(calibrate(recording))
     for segment in ("foot_l", "foot_r"):
-        assert rms_deg(_pitch(alone.q[segment]) - _pitch(full.q[segment])) < 2.0
+        assert rms_deg(_pitch(single_orientations.q[segment]) - _pitch(full.q[segment])) < 2.0
 
 
 def test_nothing_calibrated_is_an_error() -> None:

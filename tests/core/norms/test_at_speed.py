@@ -1,4 +1,4 @@
-"""Norms at the person's speed: what the shipped tables say, joined to the comfortable ones, no further."""
+"""Norms at the person's speed: shipped tables, continuity with comfortable norms, range."""
 
 from __future__ import annotations
 
@@ -56,11 +56,11 @@ def test_the_curves_of_all_adults_are_those_of_the_table() -> None:
     usual = adult_kinematics(None).bands
     for (variable, speed), table in rows.items():
         mean, sd = np.array(table).T
-        found = bands_at_speed(None, v_star(speed))[variable]
-        assert np.abs(found.mean_deg - mean).max() < 0.02
+        result = bands_at_speed(None, v_star(speed))[variable]
+        assert np.abs(result.mean_deg - mean).max() < 0.02
         # a single side spreads more than the table's mean of both, by as much at every speed
         comfortable = np.array(rows[variable, 1.25])[:, 1]
-        assert found.sd_deg / usual[variable].sd_deg == pytest.approx(sd / comfortable, abs=0.01)
+        assert result.sd_deg / usual[variable].sd_deg == pytest.approx(sd / comfortable, abs=0.01)
 
 
 @pytest.mark.parametrize("age", [30, 70, None])
@@ -69,9 +69,9 @@ def test_at_comfortable_speed_both_norms_are_one(age: float | None) -> None:
     for variable, band in met.items():
         assert band.mean_deg == pytest.approx(usual[variable].mean_deg, abs=1e-9)
         assert band.sd_deg == pytest.approx(usual[variable].sd_deg, abs=1e-9)
-    known = angle_values(age).values
+    known_values = angle_values(age).values
     for name, value in angle_values_at_speed(age, COMFORTABLE).items():
-        assert value.mean == pytest.approx(known[name].mean, abs=1e-9)
+        assert value.mean == pytest.approx(known_values[name].mean, abs=1e-9)
 
 
 def test_figures_are_means_of_individual_figures_not_figures_of_the_mean_curve() -> None:
@@ -80,9 +80,9 @@ def test_figures_are_means_of_individual_figures_not_figures_of_the_mean_curve()
         if name is None:
             continue
         for speed in (0.25, 0.3, 0.5, 0.8, 1.0, 1.25):
-            found = angle_values_at_speed(None, v_star(speed))[name]
+            result = angle_values_at_speed(None, v_star(speed))[name]
             printed = float(row[f"{speed}"])
-            assert found.mean == pytest.approx(printed, abs=0.13), (name, speed)
+            assert result.mean == pytest.approx(printed, abs=0.13), (name, speed)
     slow = v_star(0.3)
     knee = bands_at_speed(None, slow)["knee_flexion"].mean_deg
     peak = angle_values_at_speed(None, slow)["knee_flexion_max_swing_deg"].mean
@@ -95,56 +95,56 @@ def test_figures_are_means_of_individual_figures_not_figures_of_the_mean_curve()
 def test_the_spread_of_a_figure_is_what_a_person_left_out_departs_from_it(
     speed: float, spread: float
 ) -> None:
-    found = angle_values_at_speed(None, v_star(speed))["knee_flexion_max_swing_deg"]
-    assert found.sd == pytest.approx(np.hypot(spread, 3.40 / 2), abs=0.01), "of a single side"
-    assert found.n == 52
+    result = angle_values_at_speed(None, v_star(speed))["knee_flexion_max_swing_deg"]
+    assert result.sd == pytest.approx(np.hypot(spread, 3.40 / 2), abs=0.01), "of a single side"
+    assert result.n == 52
 
 
 def test_times_and_distances_agree_with_the_people_measured_at_that_speed() -> None:
     """Means of the bins of 0.1 m/s, for steps of 2.4 cm and cadence of 5/min at most; all within an sd."""
-    seen = 0
+    observations = 0
     for r in read_rows("spatiotemporal_by_speed_bin_rehazenter52"):
         v = float(r["dimensionless_speed_mean"])
         if not is_matched(v):
             continue
-        seen += 1
+        observations += 1
         sparse = int(r["n_subjects"]) < 10  # the gap between two conditions
         leg = (float(r["speed_mean"]) / v) ** 2 / GRAVITY
-        found = walkway_values_at_speed(v, leg)
+        result = walkway_values_at_speed(v, leg)
         for name, column, least in (
             ("stance_pct", "stance_pct", 0.85),
             ("initial_double_support_pct", "initial_double_support_pct", 0.85),
             ("step_length_m", "step_length_m", 0.025),
             ("cadence_spm", "cadence", 5.0),
         ):
-            off = abs(found[name].mean - float(r[f"{column}_mean"]))
+            off = abs(result[name].mean - float(r[f"{column}_mean"]))
             assert off <= float(r[f"{column}_std"]), (name, v)
             assert off <= least or sparse, (name, v)
-            assert off <= found[name].sd * (1.5 if sparse else 0.7), (name, v)
-    assert seen >= 9
+            assert off <= result[name].sd * (1.5 if sparse else 0.7), (name, v)
+    assert observations >= 9
 
 
 def test_steps_and_cadence_give_the_speed() -> None:
     for speed in (0.25, 0.5, 0.8, 1.2):
-        found = walkway_values_at_speed(v_star(speed), NORM_LEG_M)
-        made = found["step_length_m"].mean * found["cadence_spm"].mean / 60.0
-        assert made == pytest.approx(speed, rel=0.02)
-        assert found["stride_time_s"].mean == pytest.approx(2.0 * found["step_time_s"].mean)
-        stance, double = found["stance_pct"].mean, found["double_support_pct"].mean
-        assert found["swing_pct"].mean == pytest.approx(100.0 - stance)
-        assert double == pytest.approx(2.0 * found["initial_double_support_pct"].mean, abs=1.3)
+        results = walkway_values_at_speed(v_star(speed), NORM_LEG_M)
+        result = results["step_length_m"].mean * results["cadence_spm"].mean / 60.0
+        assert result == pytest.approx(speed, rel=0.02)
+        assert results["stride_time_s"].mean == pytest.approx(2.0 * results["step_time_s"].mean)
+        stance, double = results["stance_pct"].mean, results["double_support_pct"].mean
+        assert results["swing_pct"].mean == pytest.approx(100.0 - stance)
+        assert double == pytest.approx(2.0 * results["initial_double_support_pct"].mean, abs=1.3)
 
 
 @pytest.mark.parametrize(
     ("speed", "stance", "step", "cadence"), [(0.3, 75.3, 0.403, 44.8), (0.8, 65.8, 0.559, 86.1)]
 )
 def test_slow_healthy_walking_in_figures(speed: float, stance: float, step: float, cadence: float) -> None:
-    found = look_up_norms(None, None, speed)
-    assert found.values["stance_pct"].mean == pytest.approx(stance, abs=0.05)
-    assert found.values["step_length_m"].mean == pytest.approx(step, abs=0.002)
-    assert found.values["cadence_spm"].mean == pytest.approx(cadence, abs=0.2)
-    assert {found.values[n].group for n in ("cadence_spm", "knee_flexion_rom_deg")} == {ASKED}
-    assert (found.reason, found.timing_reason) == (None, None), "neither age nor sex is needed"
+    norms = look_up_norms(None, None, speed)
+    assert norms.values["stance_pct"].mean == pytest.approx(stance, abs=0.05)
+    assert norms.values["step_length_m"].mean == pytest.approx(step, abs=0.002)
+    assert norms.values["cadence_spm"].mean == pytest.approx(cadence, abs=0.2)
+    assert {norms.values[n].group for n in ("cadence_spm", "knee_flexion_rom_deg")} == {ASKED}
+    assert (norms.reason, norms.timing_reason) == (None, None), "neither age nor sex is needed"
 
 
 def test_both_norms_are_there_below_comfortable_speed_and_one_above() -> None:

@@ -53,11 +53,11 @@ def test_mean_and_spread_are_between_people_one_side_at_a_time() -> None:
 
 
 def test_a_person_measured_often_counts_once() -> None:
-    once = [session(f"c{i}", 60.0 + i) for i in range(5)]
-    often = once + [session("c4", 60.0 + x) for x in (2.0, 6.0)] * 3
+    sessions = [session(f"c{i}", 60.0 + i) for i in range(5)]
+    often = sessions + [session("c4", 60.0 + x) for x in (2.0, 6.0)] * 3
     assert control_group(often).n == 5
     assert control_group(often).values["stance_pct"].mean == pytest.approx(
-        control_group(once).values["stance_pct"].mean
+        control_group(sessions).values["stance_pct"].mean
     )
 
 
@@ -131,14 +131,14 @@ def test_controls_score_raw_from_standing_because_they_stand_alike() -> None:
         {s: np.ones(4, np.bool_) for s in SIDES},
         {s: np.full(4, 62.0) for s in SIDES},
     )
-    found = score_curves(curves, reference=group.reference)
-    assert found.zero == "standing"
-    raw = found.find("gps_deg", "raw")
+    scores = score_curves(curves, reference=group.reference)
+    assert scores.zero == "standing"
+    raw = scores.find("gps_deg", "raw")
     assert raw.value is not None
     assert 2.0 < raw.value < 9.0
     assert score_curves(curves).find("gps_deg", "raw").reason == "variables_missing"
-    kept = mean_curves(curves)
-    assert kept["left"]["knee_flexion"] == pytest.approx(person["left"]["knee_flexion"])
+    retained = mean_curves(curves)
+    assert retained["left"]["knee_flexion"] == pytest.approx(person["left"]["knee_flexion"])
 
 
 @pytest.mark.recorded

@@ -24,9 +24,9 @@ from sagittal.server.report.view.functional import NO_AGE, NO_SEX, OTHER_AGE, no
     ],
 )
 def test_comfortable_speed_by_age_and_sex(age: float, sex: str, expected: float) -> None:
-    found = find_comfortable_speed(age, sex)
-    assert found is not None
-    assert found.mean_mps == expected
+    comfortable_speed = find_comfortable_speed(age, sex)
+    assert comfortable_speed is not None
+    assert comfortable_speed.mean_mps == expected
 
 
 def test_comfortable_speed_ranges_as_the_abstract_says() -> None:
@@ -52,15 +52,15 @@ def test_there_is_none_for_children_and_the_unknown() -> None:
     ],
 )
 def test_six_minutes_only_at_ages_that_were_measured(age: float, sex: str, expected: float | None) -> None:
-    found = find_six_minute_norm(age, sex)
-    assert (None if found is None else found.mean_m) == expected
+    six_minute_norm = find_six_minute_norm(age, sex)
+    assert (None if six_minute_norm is None else six_minute_norm.mean_m) == expected
     assert find_six_minute_norm(40, "other") is None
 
 
 def test_six_minutes_are_told_with_their_source() -> None:
-    told = norm_words("walk_6min_distance_m", 50.0, "female")
-    assert "581 m" in told
-    assert "Respir Res" in told
+    notices = norm_words("walk_6min_distance_m", 50.0, "female")
+    assert "581 m" in notices
+    assert "Respir Res" in notices
     assert norm_words("walk_6min_distance_m", None, "male") == NO_AGE
     assert norm_words("walk_6min_distance_m", 50.0, None) == NO_SEX
     assert norm_words("walk_6min_distance_m", 90.0, "male") == OTHER_AGE

@@ -23,10 +23,10 @@ def norm(**changes: Any) -> NormValue:
 
 
 def test_a_value_gets_its_z_and_percentile() -> None:
-    above = place_value(68.0, norm())
-    assert above.z == pytest.approx(2.0)
-    assert above.percentile == pytest.approx(97.3, abs=0.1), "42 people: a little less sure than 97.7"
-    assert above.grade == 1
+    upper = place_value(68.0, norm())
+    assert upper.z == pytest.approx(2.0)
+    assert upper.percentile == pytest.approx(97.3, abs=0.1), "42 people: a little less sure than 97.7"
+    assert upper.grade == 1
     assert place_value(60.0, norm()).percentile == pytest.approx(50.0)
     assert (place_value(55.0, norm()).grade, place_value(38.0, norm()).grade) == (0, 2)
 
@@ -48,8 +48,8 @@ def test_few_controls_make_no_extreme_percentile() -> None:
     ],
 )
 def test_no_place_says_why(value: float | None, reference: NormValue | None, reason: str) -> None:
-    found = place_value(value, reference)
-    assert (found.z, found.percentile, found.grade, found.reason) == (None, None, None, reason)
+    result = place_value(value, reference)
+    assert (result.z, result.percentile, result.grade, result.reason) == (None, None, None, reason)
 
 
 def test_differences_between_sides_compare_even_where_the_level_does_not() -> None:
@@ -110,14 +110,14 @@ def test_the_walkway_norm_is_that_of_the_pace_walked(
     assert pace_of(25, "male", 1.0) == "slow"
     assert pace_of(25, "male", 0.82) is None
     assert pace_of(age, "male", speed) == pace
-    found = look_up_norms(age, "male", speed)
-    assert found.pace == pace
+    norms = look_up_norms(age, "male", speed)
+    assert norms.pace == pace
     if pace is None:
-        assert found.timing_reason == "no_speed_matched_norm"
-        assert "cadence_spm" not in found.values
-        assert "knee_flexion_rom_deg" not in found.values
+        assert norms.timing_reason == "no_speed_matched_norm"
+        assert "cadence_spm" not in norms.values
+        assert "knee_flexion_rom_deg" not in norms.values
     else:
-        assert f"{pace} pace" in found.values["cadence_spm"].group
+        assert f"{pace} pace" in norms.values["cadence_spm"].group
 
 
 @pytest.mark.parametrize("age", [None, 30, 65])
@@ -141,26 +141,26 @@ def test_times_at_a_fast_speed_have_the_norm_of_the_fast_class_or_none() -> None
 
 
 def test_without_age_or_sex_angles_are_compared_and_times_are_not() -> None:
-    found = look_up_norms(None, None, 1.3)
-    assert found.place("knee_flexion_rom_deg", 64.69).z == pytest.approx(0.0)
-    assert found.place("cadence_spm", 100.0).reason == "age_unknown"
+    norms = look_up_norms(None, None, 1.3)
+    assert norms.place("knee_flexion_rom_deg", 64.69).z == pytest.approx(0.0)
+    assert norms.place("cadence_spm", 100.0).reason == "age_unknown"
     assert look_up_norms(30, None, 1.3).place("cadence_spm", 100.0).reason == "sex_unknown"
 
 
 def test_levels_compare_only_where_the_anatomical_level_is_known() -> None:
     standing = look_up_norms(30, "male", 1.3)
     assert standing.place("knee_flexion_max_swing_deg", 61.0).reason == "not_comparable"
-    known = look_up_norms(30, "male", 1.3, anatomical=("knee_flexion", "pelvis_tilt"))
-    assert known.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
-    assert known.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
-    assert "depends on the protocol" in known.bands["knee_flexion"].note
-    assert "depends on the protocol" in known.values["knee_flexion_max_swing_deg"].note
-    assert known.values["knee_flexion_rom_deg"].note == ""
+    known_norms = look_up_norms(30, "male", 1.3, anatomical=("knee_flexion", "pelvis_tilt"))
+    assert known_norms.place("knee_flexion_max_swing_deg", 61.08).z == pytest.approx(0.0)
+    assert known_norms.place("hip_flexion_min_deg", -8.0).reason == "not_comparable"
+    assert "depends on the protocol" in known_norms.bands["knee_flexion"].note
+    assert "depends on the protocol" in known_norms.values["knee_flexion_max_swing_deg"].note
+    assert known_norms.values["knee_flexion_rom_deg"].note == ""
 
 
 def test_every_norm_shown_has_source_group_and_number_or_none() -> None:
-    found = look_up_norms(72, "female", 1.1, 1.62)
-    for value in (*found.values.values(), *found.expected.values()):
+    norms = look_up_norms(72, "female", 1.1, 1.62)
+    for value in (*norms.values.values(), *norms.expected.values()):
         assert value.source
         assert value.group
         assert value.n is None or value.n > 10
@@ -170,8 +170,8 @@ def test_expected_step_and_cadence_multiply_to_the_speed_on_any_legs() -> None:
     for speed in np.linspace(0.5, 1.5, 6):
         for leg in (None, 0.78, 0.9, 1.05):
             e = predict_at_speed(float(speed), 30, leg)
-            made = e["step_length_m"].mean * e["cadence_spm"].mean / 60.0
-            assert made == pytest.approx(speed, rel=0.03), "two fits of the same walks"
+            result = e["step_length_m"].mean * e["cadence_spm"].mean / 60.0
+            assert result == pytest.approx(speed, rel=0.03), "two fits of the same walks"
     short, long = predict_at_speed(1.2, 30, 0.78), predict_at_speed(1.2, 30, 1.05)
     assert short["cadence_spm"].mean > long["cadence_spm"].mean
     assert sqrt(GRAVITY / 0.9) == pytest.approx(3.30, abs=0.01)

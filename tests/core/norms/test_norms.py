@@ -1,4 +1,4 @@
-"""The reference tables: complete, attributed, and honest about what may be compared."""
+"""Reference tables: complete, attributed, and correct on comparability."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ def test_the_adult_knee_is_the_published_one() -> None:
      (55, "adult_55_84", 17), (93, "adult_55_84", 17)],
 )  # fmt: skip
 def test_the_age_chooses_the_group(age: float | None, group: str, n: int) -> None:
-    found = adult_kinematics(age)
-    assert found.reason is None
-    for band in found.bands.values():
+    result = adult_kinematics(age)
+    assert result.reason is None
+    for band in result.bands.values():
         assert (band.group, band.n) == (group, n)
         assert band.mean_deg.shape == band.sd_deg.shape == (101,)
         assert np.isfinite(band.mean_deg).all()
@@ -95,8 +95,8 @@ def test_every_band_says_its_zero_and_how_far_to_trust_it() -> None:
 
 def test_angle_references_exist_for_our_angle_parameters_and_only_ranges_compare() -> None:
     values = angle_values(30).values
-    known = {name for name in list_curve_figures() if CATALOGUE[name].norm is not None}
-    assert set(values) == {*known, "pelvis_obliquity_max_swing_deg"}
+    known_names = {name for name in list_curve_figures() if CATALOGUE[name].norm is not None}
+    assert set(values) == {*known_names, "pelvis_obliquity_max_swing_deg"}
     assert {n for n, v in values.items() if v.comparable} == {
         "hip_flexion_rom_deg", "knee_flexion_rom_deg", "ankle_dorsiflexion_rom_deg",
     }  # fmt: skip
@@ -126,8 +126,8 @@ def test_temporal_references_by_age_and_sex() -> None:
     [(None, "female", "age_unknown"), (40, None, "sex_unknown"), (95, "male", "no_norm_for_age")],
 )
 def test_no_temporal_reference_says_why(age: float | None, sex: str | None, reason: str) -> None:
-    found = temporal_values(age, sex)  # type: ignore[arg-type]
-    assert (dict(found.values), found.reason) == ({}, reason)
+    result = temporal_values(age, sex)  # type: ignore[arg-type]
+    assert (dict(result.values), result.reason) == ({}, reason)
 
 
 @pytest.mark.parametrize("sex", ["F", "M"])
@@ -159,11 +159,13 @@ def test_a_single_side_spreads_more_than_the_mean_of_both() -> None:
     for name, figure in list_curve_figures().items():
         part = slice(figure.start_pct, figure.end_pct + 1)
         read = FIGURE[figure.statistic]
-        both = np.array([[read(p[s][figure.variable][part]) for s in SIDES] for p in people()])
-        single = np.sqrt(both.var(axis=0, ddof=1).mean())
-        assert values[name].mean == pytest.approx(both.mean(), abs=0.006)
+        joint_values = np.array([[read(p[s][figure.variable][part]) for s in SIDES] for p in people()])
+        single = np.sqrt(joint_values.var(axis=0, ddof=1).mean())
+        assert values[name].mean == pytest.approx(joint_values.mean(), abs=0.006)
         assert values[name].sd == pytest.approx(single, abs=0.011), name
-        assert values[name].difference_sd == pytest.approx(np.std(both[:, 0] - both[:, 1], ddof=1), abs=0.006)
+        assert values[name].difference_sd == pytest.approx(
+            np.std(joint_values[:, 0] - joint_values[:, 1], ddof=1), abs=0.006
+        )
 
 
 FIGURE: dict[str, Callable[[Floats], float]] = {
@@ -185,5 +187,5 @@ def test_shares_of_the_stride_compare_only_where_contacts_are_exact(
     for name in ("stance_pct", "swing_pct", "double_support_pct", "single_support_pct"):
         assert held[name].comparable == compared
         assert compared or held[name].note.startswith("Not comparable")
-    rest = {name for name in values if not name.endswith("_pct")}
-    assert all(held[name] == values[name] for name in rest), "nothing else is touched"
+    names = {name for name in values if not name.endswith("_pct")}
+    assert all(held[name] == values[name] for name in names), "nothing else is touched"

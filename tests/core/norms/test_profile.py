@@ -100,26 +100,28 @@ def test_people_who_lack_a_side_or_a_joint_are_scored_by_what_they_have() -> Non
             scores: dict[Side, dict[str, float]] = {side: {} for side in SIDES}
             for side, own in this.items():
                 for variable, curve in own.items():
-                    others = [
-                        np.mean([of[variable] for of in person.values() if variable in of], axis=0)
+                    other_averages = [
+                        np.mean(
+                            [source[variable] for source in person.values() if variable in source], axis=0
+                        )
                         for person in group
-                        if person is not this and any(variable in of for of in person.values())
+                        if person is not this and any(variable in source for source in person.values())
                     ]
-                    scores[side][variable] = float(gvs(curve, np.mean(others, axis=0), mode))
+                    scores[side][variable] = float(gvs(curve, np.mean(other_averages, axis=0), mode))
                     expected.setdefault(variable, []).append(scores[side][variable])
             for name, variables in PROFILES.items():
                 values = {
                     f"{name}_side": [side_profile(scores[side], variables) for side in SIDES],
                     f"{name}_overall": [overall_profile(scores, variables)],
                 }
-                for part, found in values.items():
-                    expected.setdefault(part, []).extend(x for x in found if x is not None)
+                for part, result in values.items():
+                    expected.setdefault(part, []).extend(x for x in result if x is not None)
         assert 1 < len(expected["gps_side"]) < 2 * len(expected["gps_overall"]) + 4 < 2 * len(group)
         spreads = leave_one_out(group)[mode]
         assert set(spreads) == set(expected)
-        for what, x in expected.items():
-            assert spreads[what].mean_deg == pytest.approx(np.mean(x), rel=1e-12), what
-            assert spreads[what].sd_deg == pytest.approx(np.std(x, ddof=1), rel=1e-12), what
+        for label, x in expected.items():
+            assert spreads[label].mean_deg == pytest.approx(np.mean(x), rel=1e-12), label
+            assert spreads[label].sd_deg == pytest.approx(np.std(x, ddof=1), rel=1e-12), label
 
 
 def test_one_person_alone_has_nobody_to_be_compared_with() -> None:

@@ -1,4 +1,4 @@
-"""Live calibration: its stages, what it waits for and says, and that it is the offline one."""
+"""Live calibration: stages, waiting and messages, and equality with the offline one."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Seen = tuple[int, Stage, CalibrationView]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A calibrator after some samples, what it gave, and each change of what it said."""
+    """Calibrator after some samples, its results, and each change of its message."""
 
     calibrator: LiveCalibrator
     found: tuple[LiveCalibration, ...]
@@ -71,16 +71,16 @@ def run(
 ) -> Run:
     """Push a recording in blocks of n; `at` is called after each with the samples so far."""
     calibrator = LiveCalibrator(wearer(recording))
-    found: list[LiveCalibration] = []
-    seen: list[Seen] = []
+    result: list[LiveCalibration] = []
+    observations: list[Seen] = []
     for block in blocks(recording, n):
         if (calibration := calibrator.push(block)) is not None:
-            found.append(calibration)
+            result.append(calibration)
         past = block.first + len(block)
         at(calibrator, past)
-        if not seen or (calibrator.stage, calibrator.view) != seen[-1][1:]:
-            seen.append((past, calibrator.stage, calibrator.view))
-    return Run(calibrator, tuple(found), tuple(seen))
+        if not observations or (calibrator.stage, calibrator.view) != observations[-1][1:]:
+            observations.append((past, calibrator.stage, calibrator.view))
+    return Run(calibrator, tuple(result), tuple(observations))
 
 
 @cache
@@ -98,38 +98,38 @@ def test_stand_walk_and_it_runs() -> None:
     done = walked()
     assert done.stages == ("stand", "walk", "running")
     assert len(done.found) == 1
-    found = done.found[0]
-    assert found.ok
-    assert found.first == 0
-    assert found.past % 50 == 0
-    assert len(found.calibrated.recording.t_s) == found.past - found.first
+    result = done.found[0]
+    assert result.ok
+    assert result.first == 0
+    assert result.past % 50 == 0
+    assert len(result.calibrated.recording.t_s) == result.past - result.first
     assert done.calibrator.view.ok
     assert done.calibrator.view.steps >= 8 or done.calibrator.view.walked_s >= 12.0
-    assert {c.segment for c in found.checks} == set(walk().sensors)
-    assert all(c.method == "walking_direction" and c.score and c.score > 0.5 for c in found.checks)
+    assert {c.segment for c in result.checks} == set(walk().sensors)
+    assert all(c.method == "walking_direction" and c.score and c.score > 0.5 for c in result.checks)
 
 
 def test_its_score_judges_the_joints_too_and_is_gone_when_it_begins_anew() -> None:
     done = walked()
-    (found,) = done.found
-    score = found.score
+    (result,) = done.found
+    score = result.score
     assert score.verdict == "pass"
-    judged = {c.segment for c in score.checks if c.name == "joint_misfit" and c.verdict == "pass"}
-    assert judged == set(WHOLE)
+    segments = {c.segment for c in score.checks if c.name == "joint_misfit" and c.verdict == "pass"}
+    assert segments == set(WHOLE)
     assert done.seen[-1][2].score == score
     assert all(view.score is None for _, stage, view in done.seen if stage != "running")
 
 
 def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
-    found = walked().found[0]
-    part = cut(walk(), 0.0, found.past / 100.0)
+    result = walked().found[0]
+    part = cut(walk(), 0.0, result.past / 100.0)
     calibrated = calibrate(part)
     body, _ = nominal_body(part.subject.height_m, part.subject.standing_width_m, part.subject.shoe)
     calibrated, orientations = lean_legs_apart(calibrated, estimate_orientations(calibrated), body)
     offline, _, turned = align_forward_axes(calibrated, orientations, body, WHOLE, ErkfParams.people())
-    assert found.turned == turned
+    assert result.turned == turned
     for segment, mounted in offline.calibration.segments.items():
-        ours = found.calibrated.calibration.segments[segment]
+        ours = result.calibrated.calibration.segments[segment]
         assert np.array_equal(ours.R_segment_sensor, mounted.R_segment_sensor)
         assert np.array_equal(ours.gyro_bias, mounted.gyro_bias)
 
@@ -137,12 +137,12 @@ def test_it_is_the_offline_calibration_of_the_same_samples() -> None:
 @pytest.mark.sweep
 @pytest.mark.parametrize("n", [1, 7, 333, 10_000])
 def test_no_border_of_a_block_is_seen_in_it(n: int) -> None:
-    found, again = walked().found[0], run(walk(), n).found[0]
-    assert (again.first, again.past) == (found.first, found.past)
-    assert again.checks == found.checks
-    for segment, mounted in found.calibrated.calibration.segments.items():
-        other = again.calibrated.calibration.segments[segment]
-        assert other.R_segment_sensor.tobytes() == mounted.R_segment_sensor.tobytes()
+    result, repeat = walked().found[0], run(walk(), n).found[0]
+    assert (repeat.first, repeat.past) == (result.first, result.past)
+    assert repeat.checks == result.checks
+    for segment, mounted in result.calibrated.calibration.segments.items():
+        other_segments = repeat.calibrated.calibration.segments[segment]
+        assert other_segments.R_segment_sensor.tobytes() == mounted.R_segment_sensor.tobytes()
 
 
 def test_what_is_said_is_the_same_at_the_same_sample_whatever_the_blocks() -> None:
@@ -203,31 +203,31 @@ def test_redo_begins_anew_with_the_next_sample() -> None:
 def test_blocks_need_not_be_pushed_while_it_runs() -> None:
     first = walked().found[0]
     calibrator = LiveCalibrator(wearer(walk()))
-    again: list[LiveCalibration] = []
+    repeat: list[LiveCalibration] = []
     for block in blocks(joined(walk(), walk()), 50):
         if block.first == 3000:
             assert calibrator.stage == "running"
             calibrator.redo()
-        if calibrator.stage != "running" and (found := calibrator.push(block)) is not None:
-            again.append(found)
-    assert [(x.first, x.past) for x in again] == [(0, first.past), (3000, 3000 + first.past)]
-    mounts = [x.calibrated.calibration.segments["shank_r"].R_segment_sensor for x in again]
+        if calibrator.stage != "running" and (frame := calibrator.push(block)) is not None:
+            repeat.append(frame)
+    assert [(x.first, x.past) for x in repeat] == [(0, first.past), (3000, 3000 + first.past)]
+    mounts = [x.calibrated.calibration.segments["shank_r"].R_segment_sensor for x in repeat]
     assert np.array_equal(mounts[0], mounts[1])
 
 
 @pytest.mark.sweep
 def test_a_person_may_stand_for_long_and_only_the_last_of_it_is_kept() -> None:
     recording, _ = scripted((Stand(60.0), Straight(14.0, 0.6, 0.55), Stand(2.0)))
-    found = run(recording).found[0]
-    assert found.past - found.first < 30 * 100
-    begins = found.calibrated.calibration.walking[0][0]
+    result = run(recording).found[0]
+    assert result.past - result.first < 30 * 100
+    begins = result.calibrated.calibration.walking[0][0]
     assert 10.0 < begins < 17.0
-    assert found.ok
+    assert result.ok
 
 
 @pytest.mark.sweep
 def test_who_moves_before_walking_stands_again() -> None:
-    """Shifting from foot to foot for a while is no walk; the standing has to be had anew."""
+    """Shifting between feet is no walk; standing must be repeated."""
     still = cut(walk(), 0.0, 4.0)
     rng = np.random.default_rng(3)
     sway = replace(
@@ -270,7 +270,7 @@ def test_a_walk_round_a_corner_has_twelve_seconds() -> None:
 
 
 def strapped_on(seed: int) -> UniformRecording:
-    """Seven sensors lie still for 4 s, then one after the other is picked up, turned and left otherwise."""
+    """Seven sensors rest for 4 s, then are picked up one by one, rotated and put down differently."""
     rng = np.random.default_rng(seed)
     first = walk()
     n, sensors = 3400, {}
@@ -289,8 +289,8 @@ def strapped_on(seed: int) -> UniformRecording:
         push = 3.0 * np.sin(2 * np.pi * rng.uniform(0.3, 2.0, 3) * t[:, None]) * held[:, None]
         acc = rotate(conjugate(q), np.array([0.0, 0.0, 9.81])) + push + rng.normal(0, 0.02, (n, 3))
         gyr = rate + rng.normal(0, 0.002, (n, 3))
-        here = np.ones(n, np.bool_)
-        sensors[segment] = replace(x, acc=acc, gyr=gyr, mag=None, valid=here, interpolated=~here)
+        mask = np.ones(n, np.bool_)
+        sensors[segment] = replace(x, acc=acc, gyr=gyr, mag=None, valid=mask, interpolated=~mask)
     return replace(first, t_s=np.arange(n) / 100.0, sensors=sensors)
 
 
@@ -299,12 +299,12 @@ def strapped_on(seed: int) -> UniformRecording:
 def test_strapping_sensors_on_is_no_walk(seed: int) -> None:
     done = run(joined(strapped_on(seed), walk()))
     assert len(done.found) == 1
-    found = done.found[0]
-    assert found.ok
-    assert found.first >= 3400
-    alone = walked().found[0].calibrated.calibration.segments
-    for segment, mounted in found.calibrated.calibration.segments.items():
-        assert np.allclose(mounted.R_segment_sensor, alone[segment].R_segment_sensor, atol=0.03)
+    result = done.found[0]
+    assert result.ok
+    assert result.first >= 3400
+    single_segments = walked().found[0].calibrated.calibration.segments
+    for segment, mounted in result.calibrated.calibration.segments.items():
+        assert np.allclose(mounted.R_segment_sensor, single_segments[segment].R_segment_sensor, atol=0.03)
 
 
 @pytest.mark.sweep
@@ -316,16 +316,16 @@ def test_a_sensor_turned_between_two_standings_makes_the_second_count() -> None:
         )
     )  # fmt: skip
     n = 700
-    by = exp(np.array([0.0, 0.0, 0.6]))
+    by_key = exp(np.array([0.0, 0.0, 0.6]))
     x = recording.sensors["shank_r"]
-    acc, gyr = (np.where(np.arange(len(v))[:, None] < n, rotate(by, v), v) for v in (x.acc, x.gyr))
-    before = replace(
+    acc, gyr = (np.where(np.arange(len(v))[:, None] < n, rotate(by_key, v), v) for v in (x.acc, x.gyr))
+    initial_variant = replace(
         recording, sensors={**recording.sensors, "shank_r": replace(x, acc=acc, gyr=gyr, mag=None)}
     )
-    plain, done = run(recording), run(before)
-    told = [v.problem for _, _, v in done.seen if v.problem is not None]
-    assert {p.code for p in told} == {"sensor_moved"}
-    assert {p.sensor for p in told} == {"shank_r"}
+    plain, done = run(recording), run(initial_variant)
+    notices = [v.problem for _, _, v in done.seen if v.problem is not None]
+    assert {p.code for p in notices} == {"sensor_moved"}
+    assert {p.sensor for p in notices} == {"shank_r"}
     assert plain.found[0].first == 0
     assert done.found[0].first > n
     assert done.found[0].ok
@@ -345,8 +345,8 @@ def test_a_take_in_which_hardly_anybody_walks_begins_anew() -> None:
 def test_a_contradicting_mounting_is_told_and_not_calibrated() -> None:
     recording, _ = scripted((Stand(5.0), Straight(16.0, 0.6, 0.55), Stand(4.0)))
     left, right = (run(replace(recording, mounting={"shank_l": f"face {way}"})) for way in ("left", "right"))
-    taken, refused = (left, right) if left.found else (right, left)
-    assert taken.found[0].ok
+    selection, refused = (left, right) if left.found else (right, left)
+    assert selection.found[0].ok
     assert refused.found == ()
     problems = {v.problem.code for _, _, v in refused.seen if v.problem is not None}
     assert problems == {"calibration_sign_conflict"}
@@ -357,10 +357,10 @@ def test_a_contradicting_mounting_is_told_and_not_calibrated() -> None:
 )
 def test_any_subset_is_calibrated(worn: tuple[Segment, ...]) -> None:
     done = run(only(walk(), *worn))
-    found = done.found[0]
-    assert set(found.calibrated.calibration.segments) == set(worn)
-    assert set(found.turned) == (set(worn) if "thigh_r" in worn else set())
-    assert found.ok
+    result = done.found[0]
+    assert set(result.calibrated.calibration.segments) == set(worn)
+    assert set(result.turned) == (set(worn) if "thigh_r" in worn else set())
+    assert result.ok
 
 
 def test_a_sensor_that_sends_nothing_is_waited_for_and_then_left_out() -> None:
@@ -370,10 +370,10 @@ def test_a_sensor_that_sends_nothing_is_waited_for_and_then_left_out() -> None:
     assert done.stages == ("waiting", "walk", "running")
     began = next(past for past, stage, _ in done.seen if stage == "walk")
     assert began == 1000
-    found = done.found[0]
-    assert "thigh_l" not in found.calibrated.recording.sensors
-    assert not found.ok
-    (check,) = (c for c in found.checks if c.segment == "thigh_l")
+    result = done.found[0]
+    assert "thigh_l" not in result.calibrated.recording.sensors
+    assert not result.ok
+    (check,) = (c for c in result.checks if c.segment == "thigh_l")
     assert check.method is None
     assert [n.code for n in check.notices] == ["sensor_missing"]
 
@@ -398,10 +398,10 @@ def test_the_standing_width_leans_the_legs() -> None:
 @pytest.mark.recorded
 def test_neura_walk_is_calibrated_before_it_ends() -> None:
     done = run(neura_walk(), 10)
-    found = done.found[0]
+    result = done.found[0]
     assert done.stages == ("waiting", "stand", "walk", "running")
-    assert found.ok
-    assert found.past < len(neura_walk().t_s) - 200
+    assert result.ok
+    assert result.past < len(neura_walk().t_s) - 200
 
 
 def joined(*parts: UniformRecording) -> UniformRecording:

@@ -60,7 +60,7 @@ def worn(name: str) -> UniformRecording:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """All that frames said, by sample where it is of a sample."""
+    """All messages of the frames, by sample where applicable."""
 
     events: list[GaitEvent]
     strides: list[LiveStride]
@@ -84,7 +84,7 @@ def told(frames: Sequence[LiveFrame]) -> Told:
 
 
 def _figure(f: LiveFrame) -> tuple[object, ...]:
-    bits = [{s: x.tobytes() for s, x in of.items()} for of in (f.q, f.p)]
+    bits = [{s: x.tobytes() for s, x in source.items()} for source in (f.q, f.p)]
     return (f.method, *bits, f.valid, dict(f.contact), np.array(list(f.angles.values())).tobytes())
 
 
@@ -112,10 +112,10 @@ def same(a: Told, b: Told) -> None:
     assert len(a.strides) == len(b.strides)
     assert all(same_stride(x, y) for x, y in zip(a.strides, b.strides, strict=True))
     assert a.notices == b.notices
-    for one, other in ((a.trail, b.trail), (a.figure, b.figure)):
-        both = one.keys() & other.keys()
-        assert len(both) >= min(len(one), len(other)) // 8
-        assert all(one[t] == other[t] for t in both)
+    for one, alternative in ((a.trail, b.trail), (a.figure, b.figure)):
+        pair = one.keys() & alternative.keys()
+        assert len(pair) >= min(len(one), len(alternative)) // 8
+        assert all(one[t] == alternative[t] for t in pair)
 
 
 @pytest.mark.slow
@@ -154,7 +154,7 @@ def test_a_chest_sensor_beside_the_seven_stops_neither_calibration_nor_strides()
 @pytest.mark.parametrize("sizes", [5, 10])
 def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes(sizes: int) -> None:
     take = simulated("comfortable", 1)[0]
-    again: dict[int, Told] = {}
+    repeat: dict[int, Told] = {}
     for size in (sizes, 20):
         online, frames = OnlineSession(hello_of(take), take.subject), []
         for batch in batches(take, size):
@@ -165,8 +165,8 @@ def test_a_redone_calibration_starts_at_the_next_sample_and_nothing_else_changes
         heard = [f for f in frames if f is not None]
         later = [f for f in heard if f.t_s >= 12.0]
         assert later[0].stage == "waiting"
-        again[size] = told(heard)
-    same(again[sizes], again[20])
+        repeat[size] = told(heard)
+    same(repeat[sizes], repeat[20])
 
 
 @pytest.mark.sweep
@@ -202,10 +202,10 @@ def test_an_event_is_told_in_the_push_that_brings_its_sample_and_soon() -> None:
         delays = [e.detected_s - e.time_s for e in clear if e.first_s is not None or e.kind == "tc"]
         assert min(delays) > -0.1
         assert np.percentile(delays, 95) <= FILTER_DELAY_S[name]
-        told = {(e.side, e.time_s) for e in events if e.first_s is None and e.kind == "ic"}
+        messages = {(e.side, e.time_s) for e in events if e.first_s is None and e.kind == "ic"}
         refined = {(e.side, e.first_s) for e in events if e.first_s is not None}
-        assert refined <= told
-        assert len(refined) >= 0.8 * len(told)
+        assert refined <= messages
+        assert len(refined) >= 0.8 * len(messages)
 
 
 def tracks(run: Run) -> Tracks:
@@ -289,7 +289,7 @@ def test_it_has_them_of_other_gaits_too(person: str) -> None:
 
 @pytest.mark.recorded
 def test_the_stopping_stride_of_each_foot_is_told_again_as_not_counted() -> None:
-    """neura_walk stops and stands: what is known a moment too late is taken back."""
+    """neura_walk stops: strides recognised as last are reported again as not counted."""
     run = recorded(neura_walk())
     whole = measure_gait(tracks(run))
     final = {s.n: s for s in run.strides}
@@ -303,23 +303,23 @@ def test_the_stopping_stride_of_each_foot_is_told_again_as_not_counted() -> None
 
 def test_a_stride_is_told_at_once_and_again_with_its_refined_end_and_its_distances() -> None:
     strides = streamed("seven")[1].strides
-    told: dict[int, list[LiveStride]] = {}
+    messages: dict[int, list[LiveStride]] = {}
     for s in strides:
-        before = told.setdefault(s.n, [])
-        before.append(s)
-        if len(before) < 3:
+        initial = messages.setdefault(s.n, [])
+        initial.append(s)
+        if len(initial) < 3:
             assert not s.complete
             assert s.reasons["stride_length_m"] == NOT_YET
             continue
         assert s.complete
         assert s.detected_s - s.end_s < 1.2
-        for name, value in before[1].values.items():
+        for name, value in initial[1].values.items():
             if value is not None:
                 assert s.values[name] == value
-    assert sorted(told) == list(range(len(told)))
-    for first, second in (x[:2] for x in told.values() if len(x) > 1):
+    assert sorted(messages) == list(range(len(messages)))
+    for first, second in (x[:2] for x in messages.values() if len(x) > 1):
         assert first.start_s == second.start_s
         assert 0.0 < first.detected_s - first.end_s + 0.05 < 0.15
         assert 0.0 < second.detected_s - first.detected_s <= REFINED_S + 1e-9
         assert abs(second.end_s - first.end_s) < 0.1
-    assert all(len(told[n]) == 3 for n in range(len(told) - 2))
+    assert all(len(messages[n]) == 3 for n in range(len(messages) - 2))

@@ -130,12 +130,12 @@ def test_times_of_single_samples_are_believed() -> None:
 def test_rest_doubts_and_stuck_sensors_are_told_by_segment_and_an_unchanged_sensor_stays_the_same() -> None:
     monitor = SensorHealthMonitor(HELLO)
     fill(monitor)
-    before = monitor.read_health(())
-    assert all(x is y for x, y in zip(before, monitor.read_health(()), strict=True))
+    initial_health = monitor.read_health(())
+    assert all(x is y for x, y in zip(initial_health, monitor.read_health(()), strict=True))
     hips, foot = HELLO.streams[0].sensors[0].segment, HELLO.streams[1].sensors[0].segment
     assert hips is not None
     assert foot is not None
     a, b, c = monitor.read_health((hips,), (foot,), {foot: "sensor_late"})
     assert (a.still, a.stuck, a.doubt) == (True, False, None)
     assert (c.still, c.stuck, c.doubt) == (False, True, "sensor_late")
-    assert b is before[1]
+    assert b is initial_health[1]

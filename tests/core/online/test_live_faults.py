@@ -1,4 +1,4 @@
-"""Radio hiccups of one foot while somebody walks: what still counts is as without them, or it is withheld."""
+"""Radio dropouts of one foot in walking: counted parameters are unchanged, or suppressed."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ ARC: Script = (
 
 
 @cache
-def take(walk: str, worn: str) -> UniformRecording:
+def take(walk: str, segments: str) -> UniformRecording:
     whole = scripted(ARC)[0] if walk == "arc" else cut(simulated(walk, 1)[0], 0.0, 34.0)
-    return only(whole, *SETS[worn])
+    return only(whole, *SETS[segments])
 
 
 def strides_of(recording: UniformRecording) -> list[LiveStride]:
-    """As they were told last."""
+    """Last reported version of each stride."""
     return list({s.n: s for f in live(recording)[1] for s in f.strides}.values())
 
 
 @cache
-def undisturbed(walk: str, worn: str) -> list[LiveStride]:
-    return strides_of(take(walk, worn))
+def undisturbed(walk: str, segments: str) -> list[LiveStride]:
+    return strides_of(take(walk, segments))
 
 
 def disturbed(
@@ -73,10 +73,10 @@ def disturbed(
     return replace(recording, sensors=sensors)
 
 
-def find_wrong(found: list[LiveStride], whole: list[LiveStride]) -> list[tuple[object, ...]]:
-    """Counted figures that are beyond `TOLERANCE`, and counted strides that nobody made."""
+def find_wrong(result: list[LiveStride], whole: list[LiveStride]) -> list[tuple[object, ...]]:
+    """Counted parameters beyond `TOLERANCE`, and counted strides that do not exist."""
     wrong: list[tuple[object, ...]] = []
-    for s in (s for s in found if s.counted):
+    for s in (s for s in result if s.counted):
         same = [x for x in whole if x.side == s.side and abs(x.end_s - s.end_s) < SAME_S]
         if not same:
             wrong.append((s.side, s.start_s, s.end_s))
@@ -116,11 +116,11 @@ def test_a_hiccup_leaves_no_wrong_number_that_counts(
     walk: str, worn: str, segment: Segment, fault: Fault, start_s: float, length_s: float
 ) -> None:
     whole = undisturbed(walk, worn)
-    found = strides_of(disturbed(take(walk, worn), segment, fault, start_s, length_s, 1))
-    assert find_wrong(found, whole) == []
+    strides = strides_of(disturbed(take(walk, worn), segment, fault, start_s, length_s, 1))
+    assert find_wrong(strides, whole) == []
     for side in ("left", "right"):
-        there, left = (sum(s.counted for s in x if s.side == side) for x in (whole, found))
-        assert left >= there - 3
+        target, left = (sum(s.counted for s in x if s.side == side) for x in (whole, strides))
+        assert left >= target - 3
 
 
 @pytest.mark.sweep
@@ -128,12 +128,12 @@ def test_a_hiccup_leaves_no_wrong_number_that_counts(
 def test_no_hiccup_leaves_a_wrong_number_that_counts(seed: int) -> None:
     r = np.random.default_rng(seed)
     walk = str(r.choice(["arc", "comfortable", "hemiparetic", "fast_with_turns", "slow"]))
-    worn, segment = str(r.choice(list(SETS))), FOOT[SIDES[int(r.integers(2))]]
+    text, segment = str(r.choice(list(SETS))), FOOT[SIDES[int(r.integers(2))]]
     fault: Fault = ("freeze", "hole", "burst")[int(r.integers(3))]
-    recording = take(walk, worn)
+    recording = take(walk, text)
     length_s = float(r.choice([0.03, 0.05, 0.08, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7]))
     start_s = float(r.uniform(13.0, recording.t_s[-1] - 3.0))
     if fault == "hole" and r.random() < 0.2:
         length_s = float(recording.t_s[-1]) - start_s - float(r.uniform(0.0, 1.0))
-    found = strides_of(disturbed(recording, segment, fault, start_s, length_s, seed))
-    assert find_wrong(found, undisturbed(walk, worn)) == [], (walk, worn, segment, fault, start_s, length_s)
+    strides = strides_of(disturbed(recording, segment, fault, start_s, length_s, seed))
+    assert find_wrong(strides, undisturbed(walk, text)) == [], (walk, text, segment, fault, start_s, length_s)

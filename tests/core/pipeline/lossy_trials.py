@@ -93,21 +93,21 @@ def _daily_life() -> Recording:
     return replace(simulate_day(day, setup=RecordingSetup(rate_hz=50.0)).recording, protocol="activity")
 
 
-def keep_segments(recording: Recording, worn: tuple[Segment, ...]) -> Recording:
+def keep_segments(recording: Recording, segments: tuple[Segment, ...]) -> Recording:
     """The same trial with sensors on these segments alone."""
-    kept = {d: s for d, s in recording.segments.items() if s in worn}
-    return replace(recording, streams={d: recording.streams[d] for d in kept}, segments=kept)
+    retained = {d: s for d, s in recording.segments.items() if s in segments}
+    return replace(recording, streams={d: recording.streams[d] for d in retained}, segments=retained)
 
 
 def draw_whole_trial(rng: np.random.Generator) -> tuple[str, Recording]:
     """Draw a trial of any protocol, nothing of it lost yet, and its name."""
     kind = str(rng.choice(["walk"] * 8 + ["chest", "squat", "squat", "trunk", "standing", "activity"]))
     if kind == "walk":
-        worn = str(rng.choice(list(WALKS)))
+        text = str(rng.choice(list(WALKS)))
         protocol = PROTOCOLS_OF_WALKS[int(rng.integers(len(PROTOCOLS_OF_WALKS)))]
-        made = keep_segments(walk(), WALKS[worn])
+        result = keep_segments(walk(), WALKS[text])
         belt = 1.2 if protocol == "treadmill" and rng.random() < 0.5 else None
-        return f"{protocol} with {worn}", replace(made, protocol=protocol, belt_speed_mps=belt)
+        return f"{protocol} with {text}", replace(result, protocol=protocol, belt_speed_mps=belt)
     if kind == "chest":
         worn_by: tuple[tuple[Segment, ...], ...] = (("chest",), ("chest", "pelvis"), ("chest", *FEET))
         worn_on = worn_by[int(rng.integers(3))]
@@ -116,9 +116,9 @@ def draw_whole_trial(rng: np.random.Generator) -> tuple[str, Recording]:
         name = str(rng.choice(["squats_agreed", "squats_both_legs", "squats_together"]))
         return name, _squats(name)
     if kind == "trunk":
-        made = _with_chest() if rng.random() < 0.5 else _chair_rises()
+        result = _with_chest() if rng.random() < 0.5 else _chair_rises()
         trunk: tuple[Segment, ...] = ("pelvis", "chest") if rng.random() < 0.5 else ("pelvis",)
-        return f"{made.protocol} with {trunk}", keep_segments(made, trunk)
+        return f"{result.protocol} with {trunk}", keep_segments(result, trunk)
     if kind == "standing":
         eyes: Protocol = "standing_eyes_open" if rng.random() < 0.5 else "standing_eyes_closed"
         return eyes, replace(_sway(), protocol=eyes)
@@ -130,9 +130,9 @@ Pattern = Callable[[np.random.Generator, int, int, int], Bools]
 
 
 def _own_turn(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
-    kept = np.zeros(n, np.bool_)
-    kept[k * n // sensors : (k + 1) * n // sensors] = True
-    return kept
+    stored_buffer = np.zeros(n, np.bool_)
+    stored_buffer[k * n // sensors : (k + 1) * n // sensors] = True
+    return stored_buffer
 
 
 def _alternate(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
@@ -145,16 +145,16 @@ def _nothing(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
 
 
 def _few(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
-    kept = np.zeros(n, np.bool_)
-    kept[rng.choice(n, min(n, int(rng.choice([1, 2, 3, 10]))), replace=False)] = True
-    return kept
+    stored_buffer = np.zeros(n, np.bool_)
+    stored_buffer[rng.choice(n, min(n, int(rng.choice([1, 2, 3, 10]))), replace=False)] = True
+    return stored_buffer
 
 
 def _short_stretch(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
-    kept = np.zeros(n, np.bool_)
+    stored_buffer = np.zeros(n, np.bool_)
     start = int(rng.integers(n))
-    kept[start : start + int(rng.choice([2, 20, 120, 400]))] = True
-    return kept
+    stored_buffer[start : start + int(rng.choice([2, 20, 120, 400]))] = True
+    return stored_buffer
 
 
 def _bursts(rng: np.random.Generator, n: int, k: int, sensors: int) -> Bools:
@@ -194,7 +194,7 @@ PATTERNS: Final[tuple[Pattern, ...]] = (
 )  # fmt: skip
 
 
-def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
+def lose_samples(stream: ImuStream, retained: Bools, how: str) -> ImuStream:
     """One sensor with samples lost.
 
     Parameters
@@ -202,17 +202,17 @@ def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
     how : "missing" rows are not there, "acc", "gyr" or "both" are NaN, "frozen" rows repeat the last one,
         "zero" rows hold zeros.
     """
-    acc, gyr, gone = stream.acc.copy(), None if stream.gyr is None else stream.gyr.copy(), ~kept
-    if how == "missing" and kept.any():
-        mag, quat = (None if x is None else x[kept] for x in (stream.mag, stream.quat))
-        gyr = None if gyr is None else gyr[kept]
-        return replace(stream, t_s=stream.t_s[kept], acc=acc[kept], gyr=gyr, mag=mag, quat=quat)
+    acc, gyr, gone = stream.acc.copy(), None if stream.gyr is None else stream.gyr.copy(), ~retained
+    if how == "missing" and retained.any():
+        mag, quat = (None if x is None else x[retained] for x in (stream.mag, stream.quat))
+        gyr = None if gyr is None else gyr[retained]
+        return replace(stream, t_s=stream.t_s[retained], acc=acc[retained], gyr=gyr, mag=mag, quat=quat)
     if how == "frozen":
         for start, stop in find_runs(gone):
-            at = max(start - 1, 0)
-            acc[start:stop] = acc[at]
+            index = max(start - 1, 0)
+            acc[start:stop] = acc[index]
             if gyr is not None:
-                gyr[start:stop] = gyr[at]
+                gyr[start:stop] = gyr[index]
     if how == "zero":
         acc[gone] = 0.0
         gyr = None if gyr is None else np.where(gone[:, None], 0.0, gyr)
@@ -225,15 +225,15 @@ def lose_samples(stream: ImuStream, kept: Bools, how: str) -> ImuStream:
 
 def leap(stream: ImuStream, rng: np.random.Generator) -> ImuStream:
     """One sensor all of whose times from some sample on, or of a single packet, are later than they were."""
-    n, by = len(stream.t_s), float(rng.choice([0.3, 4.0, 60.0, 512.0]))
+    n, by_key = len(stream.t_s), float(rng.choice([0.3, 4.0, 60.0, 512.0]))
     t_s: Floats = stream.t_s.copy()
-    t_s[int(rng.integers(n)) :] += by
+    t_s[int(rng.integers(n)) :] += by_key
     return replace(stream, t_s=t_s)
 
 
 @dataclass(frozen=True)
 class LossyTrial:
-    """What is analysed, and how. name : in words, for a failure's message."""
+    """Analysed input and options. name : description for failure messages."""
 
     name: str
     recording: Recording
@@ -248,18 +248,18 @@ def draw_trial(seed: int) -> LossyTrial:
     devices = list(recording.streams)
     hit = [d for d in devices if rng.random() < rng.choice([0.3, 0.7, 1.0])] or [str(rng.choice(devices))]
     together = rng.random() < 0.4
-    pattern, how = PATTERNS[int(rng.integers(len(PATTERNS)))], _draw_loss(rng)
+    pattern, loss = PATTERNS[int(rng.integers(len(PATTERNS)))], _draw_loss(rng)
     streams = dict(recording.streams)
-    said = []
+    message = []
     for k, device in enumerate(hit):
         if not together:
-            pattern, how = PATTERNS[int(rng.integers(len(PATTERNS)))], _draw_loss(rng)
-        if how == "leap":
+            pattern, loss = PATTERNS[int(rng.integers(len(PATTERNS)))], _draw_loss(rng)
+        if loss == "leap":
             streams[device] = leap(streams[device], rng)
         else:
-            kept = pattern(rng, len(streams[device].t_s), k, len(hit))
-            streams[device] = lose_samples(streams[device], kept, how)
-        said.append(f"{recording.segments.get(device)}: {how}, {pattern.__name__}")
+            retained = pattern(rng, len(streams[device].t_s), k, len(hit))
+            streams[device] = lose_samples(streams[device], retained, loss)
+        message.append(f"{recording.segments.get(device)}: {loss}, {pattern.__name__}")
     height = None if rng.random() < 0.3 else 1.75
     recording = replace(recording, streams=streams, subject=Subject(height))
     estimator: Requested = "auto"
@@ -270,7 +270,7 @@ def draw_trial(seed: int) -> LossyTrial:
         detector = get_args(Detector)[int(rng.integers(3))]
     squat = SquatParams(mounting="table_top") if rng.random() < 0.3 else SquatParams()
     config = PipelineConfig(poses=PoseParams(estimator), detector=detector, squat=squat)
-    name = f"seed {seed}: {name}, {estimator}, {detector}, {'; '.join(said)}"
+    name = f"seed {seed}: {name}, {estimator}, {detector}, {'; '.join(message)}"
     return LossyTrial(name, recording, config, bool(rng.random() < 0.5))
 
 

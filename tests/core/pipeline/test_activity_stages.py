@@ -97,15 +97,15 @@ def test_the_share_is_of_the_time_worn() -> None:
 def test_what_is_not_good_is_said(
     spans: list[tuple[ActivityKind, float]], notices: tuple[str, ...], doubts: list[str]
 ) -> None:
-    found = lived(*spans, notices=tuple(Notice(code, "So.") for code in notices))
-    assert list(list_doubts(found)) == doubts
+    result = lived(*spans, notices=tuple(Notice(code, "So.") for code in notices))
+    assert list(list_doubts(result)) == doubts
 
 
 @pytest.mark.parametrize(("unknown", "level"), [(5, "good"), (40, "usable"), (50, "usable"), (51, "poor")])
 def test_half_of_the_time_must_be_known_to_be_of_use(unknown: float, level: str) -> None:
-    told = (Notice("a", "A warning."), Notice("b", "Said.", severity="info"))
-    found = lived(("sitting", 100 - unknown), ("unknown", unknown), notices=told)
-    analysis = replace(TakeAnalysis(Recording({}, {})), activity=found)
+    messages = (Notice("a", "A warning."), Notice("b", "Said.", severity="info"))
+    result = lived(("sitting", 100 - unknown), ("unknown", unknown), notices=messages)
+    analysis = replace(TakeAnalysis(Recording({}, {})), activity=result)
     report = judge_activity(analysis, PipelineConfig()).quality
     assert report.level == level
     assert [n.code for n in report.notices] == ["a"]

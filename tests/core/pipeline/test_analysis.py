@@ -1,4 +1,4 @@
-"""What the stages of a take gave, read from one record: the later stage speaks, and each notice once."""
+"""Stage results read from one record: later stages take precedence, each notice appears once."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def test_parameters_of_a_functional_test_come_first() -> None:
     test = FunctionalTest(None, None, (), (figure("tug_duration_s"),))
     walk = replace(EMPTY, measured=measured(figure("stride_time_s")))
     assert [p.name for p in walk.parameters] == ["stride_time_s"]
-    both = replace(walk, functional=test)
-    assert [p.name for p in both.parameters] == ["tug_duration_s", "stride_time_s"]
-    assert [p.name for p in replace(both, measured=None).parameters] == ["tug_duration_s"]
+    joint_variant = replace(walk, functional=test)
+    assert [p.name for p in joint_variant.parameters] == ["tug_duration_s", "stride_time_s"]
+    assert [p.name for p in replace(joint_variant, measured=None).parameters] == ["tug_duration_s"]
 
 
 def test_squats_speak_for_themselves() -> None:
@@ -90,7 +90,7 @@ def test_every_notice_is_told_once_and_the_problem_last() -> None:
 
 
 def test_where_it_comes_from_is_told() -> None:
-    found = replace(EMPTY, version="1.2.3").provenance
-    assert found["input_sha256"] == {"a.txt": "12ab"}
-    assert (found["version"], found["schema"]) == ("1.2.3", SCHEMA)
-    assert found["parameters_sha256"] == PipelineConfig().digest
+    provenance = replace(EMPTY, version="1.2.3").provenance
+    assert provenance["input_sha256"] == {"a.txt": "12ab"}
+    assert (provenance["version"], provenance["schema"]) == ("1.2.3", SCHEMA)
+    assert provenance["parameters_sha256"] == PipelineConfig().digest

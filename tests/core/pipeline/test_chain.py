@@ -1,4 +1,4 @@
-"""What the chain hands from stage to stage."""
+"""Data passed between the stages of the chain."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ def test_the_trunk_of_a_pelvis_20_degrees_off_is_as_regular_as_of_one_that_is_no
     was, now = right.tracks.trunk["pelvis"], off.tracks.trunk["pelvis"]
     for axis in range(3):
         assert np.corrcoef(was[:, axis], now[:, axis])[0, 1] > 0.995, axis
-    known, found = ({p.name: p.mean for p in x.parameters if p.name in OF_TRUNK} for x in (right, off))
-    assert set(found) == set(OF_TRUNK)
-    for name, value in found.items():
+    reference, result = ({p.name: p.mean for p in x.parameters if p.name in OF_TRUNK} for x in (right, off))
+    assert set(result) == set(OF_TRUNK)
+    for name, value in result.items():
         # a ratio of what repeats to what hardly does moves with the last degree
-        assert value == pytest.approx(known[name], rel=0.3 if "harmonic" in name else 0.02), name
+        assert value == pytest.approx(reference[name], rel=0.3 if "harmonic" in name else 0.02), name
 
 
 @pytest.mark.slow
@@ -78,12 +78,12 @@ def test_the_mounting_that_is_told_is_the_one_that_was_used(right: TakeAnalysis,
 
 @pytest.mark.slow
 def test_a_chest_sensor_worn_on_a_walk_gets_an_axis_of_its_own() -> None:
-    made = simulate_tug()
-    walked = replace(made.recording, protocol="walk")
-    found = analyse(walked)
-    assert found.calibration is not None
-    chest = found.calibration.segments["chest"].R_segment_sensor
-    off = chest @ to_matrix(made.truth.mounts["chest"].q_segment_sensor).T
+    simulation = simulate_tug()
+    walked = replace(simulation.recording, protocol="walk")
+    analysis = analyse(walked)
+    assert analysis.calibration is not None
+    chest = analysis.calibration.segments["chest"].R_segment_sensor
+    off = chest @ to_matrix(simulation.truth.mounts["chest"].q_segment_sensor).T
     assert degrees(np.arccos((np.trace(off) - 1.0) / 2.0)) < 12.0
     without = {d: None if s == "chest" else s for d, s in walked.segments.items()}
-    assert len(found.parameters) == len(analyse(replace(walked, segments=without)).parameters)
+    assert len(analysis.parameters) == len(analyse(replace(walked, segments=without)).parameters)

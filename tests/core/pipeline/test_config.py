@@ -32,8 +32,8 @@ def declared() -> Iterator[type]:
     for module in pkgutil.walk_packages(core.__path__, "sagittal.core."):
         if module.name.startswith(ELSEWHERE):
             continue
-        found = importlib.import_module(module.name)
-        for name, kind in vars(found).items():
+        result = importlib.import_module(module.name)
+        for name, kind in vars(result).items():
             if not name.endswith("Params") or name.startswith(LIVE) or not isinstance(kind, type):
                 continue
             if kind.__module__ == module.name:
@@ -43,8 +43,8 @@ def declared() -> Iterator[type]:
 def reachable(kind: type) -> set[type]:
     """The dataclass and those of its fields, their fields, and so on."""
     hints = typing.get_type_hints(kind)
-    below = {hints[f.name] for f in dataclasses.fields(kind) if dataclasses.is_dataclass(hints[f.name])}
-    return {kind}.union(*(reachable(k) for k in below))
+    lower = {hints[f.name] for f in dataclasses.fields(kind) if dataclasses.is_dataclass(hints[f.name])}
+    return {kind}.union(*(reachable(k) for k in lower))
 
 
 def leaves(value: object) -> Iterator[tuple[str, ...]]:
@@ -130,5 +130,5 @@ def test_stored_settings_that_name_a_removed_parameter_mean_the_same_without() -
     stored = {"contacts": {"stop_share": 0.3, "step_m": 0.2}, "quality": {"rest": {"bias": 0.1}}}
     chosen = override_config(PipelineConfig(), stored)
     assert chosen == override_config(PipelineConfig(), {"contacts": {"step_m": 0.2}})
-    there = {f"config.{p.name}".split("[")[0] for p in list_parameters()}
-    assert not [name for name in REMOVED if any(f"{x}.".startswith(f"{name}.") for x in there)]
+    target = {f"config.{p.name}".split("[")[0] for p in list_parameters()}
+    assert not [name for name in REMOVED if any(f"{x}.".startswith(f"{name}.") for x in target)]

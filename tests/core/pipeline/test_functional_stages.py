@@ -25,7 +25,7 @@ from tests.helpers.kept import keep
 
 @keep
 def analysis() -> TakeAnalysis:
-    """All eight sensors are worn; the legs are not asked."""
+    """All eight sensors are worn; the legs are not used."""
     return analyse(simulate_tug("hemi_mild", 2, setup=ON_SKIN).recording)
 
 
@@ -65,20 +65,20 @@ def test_without_a_trunk_sensor_it_stops_with_a_sentence() -> None:
 
 def test_other_limits_of_turns_measure_again_from_the_test_on() -> None:
     a = analysis()
-    again = resume(a, "test", PipelineConfig())
-    assert [p.mean for p in again.parameters] == [p.mean for p in a.parameters]
+    second_resumed_run = resume(a, "test", PipelineConfig())
+    assert [p.mean for p in second_resumed_run.parameters] == [p.mean for p in a.parameters]
 
 
 def test_standing_with_the_protocol_gives_its_sway() -> None:
     a = analyse(simulate_sway().recording)
     assert a.problem is None
-    found = {p.name: p.mean for p in a.parameters}
-    assert found["sway_rms_mps2"] == pytest.approx(simulate_sway().truth["pelvis"].rms, rel=0.05)
+    by_name = {p.name: p.mean for p in a.parameters}
+    assert by_name["sway_rms_mps2"] == pytest.approx(simulate_sway().truth["pelvis"].rms, rel=0.05)
 
 
 def test_the_manifest_carries_what_a_person_said() -> None:
-    said = {"protocol": "tug", "test_limits": {"start_s": 3.5, "end_s": 20.0}}
-    read = parse_manifest(json.dumps(said).encode())
+    message = {"protocol": "tug", "test_limits": {"start_s": 3.5, "end_s": 20.0}}
+    read = parse_manifest(json.dumps(message).encode())
     assert read.test_limits == GivenLimits(3.5, 20.0)
     assert parse_manifest(b'{"protocol": "tug"}').complete_from(read).test_limits == read.test_limits
 
@@ -97,11 +97,11 @@ def test_without_strides_a_walk_test_has_nothing_to_measure() -> None:
     ],
 )
 def test_each_protocol_of_the_trunk_has_its_own_measures(protocol: Protocol, name: str) -> None:
-    """Of somebody who only stands the tests of a chair have no number, and say why."""
+    """Chair tests of a standing person have no number, with a reason."""
     stood = replace(simulate_sway().recording, protocol=protocol)
-    taken = TakeAnalysis(stood, uniform=synchronise(stood))
-    found = measure_trunk_test(taken, PipelineConfig()).functional
-    assert found is not None
-    (figure,) = (p for p in found.parameters if p.name == name)
+    take_analysis = TakeAnalysis(stood, uniform=synchronise(stood))
+    functional = measure_trunk_test(take_analysis, PipelineConfig()).functional
+    assert functional is not None
+    (figure,) = (p for p in functional.parameters if p.name == name)
     assert (figure.mean is None) == (protocol != "standing_eyes_open")
     assert (figure.reason is None) == (protocol == "standing_eyes_open")

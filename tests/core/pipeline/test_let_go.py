@@ -1,4 +1,4 @@
-"""What no later stage reads is let go of, and nothing else."""
+"""Data that no later stage reads are released, nothing else."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ def test_magnetometers_are_forgotten_wherever_an_analysis_holds_them() -> None:
     held = [x.sensors["pelvis"] for x in (left.uniform, left.agreed.recording, left.agreed.whole)]
     assert left.source.streams["A"].mag is None
     np.testing.assert_array_equal(left.source.streams["A"].acc, signal())
-    for kept in held:
-        assert kept.mag is None
-        np.testing.assert_array_equal(kept.acc, signal())
-        np.testing.assert_array_equal(kept.gyr, signal())
+    for retained in held:
+        assert retained.mag is None
+        np.testing.assert_array_equal(retained.acc, signal())
+        np.testing.assert_array_equal(retained.gyr, signal())
 
 
 def test_an_analysis_without_a_time_axis_has_only_its_streams_to_let_go_of() -> None:

@@ -67,21 +67,21 @@ def test_many_trials_with_lost_samples_end_in_results_or_a_notice(first: int) ->
 
 
 def test_feet_that_never_measure_at_the_same_time_are_named() -> None:
-    made = keep_segments(walk(), ("foot_l", "foot_r"))
-    device, other = made.streams
-    n = len(made.streams[device].t_s)
+    result = keep_segments(walk(), ("foot_l", "foot_r"))
+    device, second = result.streams
+    n = len(result.streams[device].t_s)
     early = np.arange(n) < 0.4 * n
     halves = {
-        device: lose_samples(made.streams[device], early, "both"),
-        other: lose_samples(made.streams[other], np.arange(n) > 0.6 * n, "both"),
+        device: lose_samples(result.streams[device], early, "both"),
+        second: lose_samples(result.streams[second], np.arange(n) > 0.6 * n, "both"),
     }
-    analysis = analyse(replace(made, streams=halves, subject=Subject()))
+    analysis = analyse(replace(result, streams=halves, subject=Subject()))
     assert analysis.angles is None or not analysis.angles.angles
     assert {n.sensor for n in analysis.notices} >= {"foot_l"}
 
 
 def test_no_segments_have_no_angles() -> None:
     nothing = Orientations(np.linspace(0.0, 0.1, 11), 100.0, {}, {}, "none")
-    found = measure_angles(nothing, (0.0, 0.05))
-    assert not found.angles
-    assert {n.code for n in found.notices} == {"joint_missing"}
+    angles = measure_angles(nothing, (0.0, 0.05))
+    assert not angles.angles
+    assert {n.code for n in angles.notices} == {"joint_missing"}

@@ -1,4 +1,4 @@
-"""The chain from a stage on: it gives what the whole chain gives, to the bit."""
+"""The chain resumed from a stage gives identical bits."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ OTHER = PipelineConfig(strides=StrideParams(edge_strides=2))
 
 
 @cache
-def take(*worn: Segment) -> Recording:
-    return simulate_scenario("comfortable", 1, worn=worn or None).recording
+def take(*segments: Segment) -> Recording:
+    return simulate_scenario("comfortable", 1, worn=segments or None).recording
 
 
 @cache
-def whole(*worn: Segment) -> TakeAnalysis:
-    return analyse(take(*worn))
+def whole(*segments: Segment) -> TakeAnalysis:
+    return analyse(take(*segments))
 
 
 def same(x: Any, y: Any) -> bool:
@@ -58,26 +58,26 @@ def test_the_comparison_sees_a_bit() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("stage", [s.name for s in WALK])
 def test_resumed_at_any_stage_is_the_whole(stage: str) -> None:
-    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
-    assert whole(*worn).problem is None
-    assert same(resume(whole(*worn), stage), whole(*worn))
+    segments: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    assert whole(*segments).problem is None
+    assert same(resume(whole(*segments), stage), whole(*segments))
 
 
 @pytest.mark.slow
 def test_an_analysis_that_nobody_resumes_lets_go_of_earlier_orientations_and_finds_the_same() -> None:
-    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
-    found, kept = analyse(take(*worn), resumable=False), whole(*worn)
+    segments: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    result, retained = analyse(take(*segments), resumable=False), whole(*segments)
     for name in ("posed", "angles", "tracks", "measured", "calibration", "notices"):
-        assert same(getattr(found, name), getattr(kept, name)), name
-    assert kept.fused is not None
-    assert found.fused is not None
-    assert set(found.fused.q) == {"foot_l", "foot_r"} < set(kept.fused.q)
-    assert found.mounted is not None
-    assert found.posed is not None
-    assert found.mounted.orientations is found.posed.orientations
-    for analysis, there in ((found, False), (kept, True)):
+        assert same(getattr(result, name), getattr(retained, name)), name
+    assert retained.fused is not None
+    assert result.fused is not None
+    assert set(result.fused.q) == {"foot_l", "foot_r"} < set(retained.fused.q)
+    assert result.mounted is not None
+    assert result.posed is not None
+    assert result.mounted.orientations is result.posed.orientations
+    for analysis, target in ((result, False), (retained, True)):
         streams, sensors = analysis.source.streams.values(), analysis.recording.sensors.values()
-        assert {x.mag is not None for x in streams} == {there} == {x.mag is not None for x in sensors}
+        assert {x.mag is not None for x in streams} == {target} == {x.mag is not None for x in sensors}
 
 
 @pytest.mark.sweep
@@ -93,17 +93,17 @@ def test_a_trunk_sensor_resumed_at_any_stage_is_the_whole(stage: str) -> None:
 
 @pytest.mark.slow
 def test_with_other_parameters_it_is_what_the_chain_gives_with_those() -> None:
-    worn: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
-    again = resume(whole(*worn), "parameters", OTHER)
-    assert same(again, analyse(take(*worn), OTHER))
-    assert again.provenance != whole(*worn).provenance
-    assert again.strides != whole(*worn).strides
+    segments: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
+    second_resumed_run = resume(whole(*segments), "parameters", OTHER)
+    assert same(second_resumed_run, analyse(take(*segments), OTHER))
+    assert second_resumed_run.provenance != whole(*segments).provenance
+    assert second_resumed_run.strides != whole(*segments).strides
 
 
 def test_parameters_of_an_earlier_stage_cannot_be_changed_on_the_way() -> None:
-    other = PipelineConfig(detector="consensus")
+    second = PipelineConfig(detector="consensus")
     with pytest.raises(ParameterError, match="detector belong to stages before 'poses'") as caught:
-        resume(whole("pelvis", "foot_l", "foot_r"), "poses", other)
+        resume(whole("pelvis", "foot_l", "foot_r"), "poses", second)
     assert caught.value.code == "earlier_parameters"
 
 
@@ -116,9 +116,9 @@ def test_a_stage_that_does_not_exist_is_named() -> None:
 
 
 def test_progress_tells_the_stages_that_run() -> None:
-    told: list[str] = []
-    resume(whole("pelvis", "foot_l", "foot_r"), "poses", progress=lambda stage, share: told.append(stage))
-    assert told == ["poses", "angles", "parameters", "done"]
+    names: list[str] = []
+    resume(whole("pelvis", "foot_l", "foot_r"), "poses", progress=lambda stage, share: names.append(stage))
+    assert names == ["poses", "angles", "parameters", "done"]
 
 
 def test_after_a_problem_only_what_was_reached_is_measured_again() -> None:

@@ -32,9 +32,9 @@ from tests.helpers.walks import assert_same_figures
 
 @cache
 def made(name: str = "squats_agreed") -> SquatSimulation:
-    found = simulate_movement(name, 1)
-    assert isinstance(found, SquatSimulation)
-    return found
+    simulation = simulate_movement(name, 1)
+    assert isinstance(simulation, SquatSimulation)
+    return simulation
 
 
 @cache
@@ -47,11 +47,11 @@ def test_the_protocol_decides_the_recipe_and_the_squats_are_the_true_ones() -> N
     assert a.problem is None
     assert choose_recipe(a) == SQUAT
     assert a.notices == (AGREED,)
-    found = {p.name: p for p in a.parameters}
+    by_name = {p.name: p for p in a.parameters}
     depths = np.degrees(made().truth.depths_rad)
     assert {p.side for p in a.parameters} == {"right"}
-    assert found["squat_depth_deg"].n == len(depths) == 6
-    assert found["squat_depth_deg"].mean == pytest.approx(depths.mean(), abs=3.0)
+    assert by_name["squat_depth_deg"].n == len(depths) == 6
+    assert by_name["squat_depth_deg"].mean == pytest.approx(depths.mean(), abs=3.0)
     assert a.strides is None
 
 
@@ -81,8 +81,8 @@ def test_a_height_that_nobody_gave_is_told() -> None:
     a = analyse(recording)
     assert a.notices == (AGREED, NO_HEIGHT)
     by_angle = {p.name: p.mean for p in a.parameters}
-    known = {p.name: p.mean for p in analysis().parameters}
-    assert by_angle["squat_depth_deg"] == pytest.approx(known["squat_depth_deg"], abs=0.5)
+    known_by_name = {p.name: p.mean for p in analysis().parameters}
+    assert by_angle["squat_depth_deg"] == pytest.approx(known_by_name["squat_depth_deg"], abs=0.5)
 
 
 def test_sensors_that_sit_anyhow_stop_it() -> None:
@@ -96,8 +96,8 @@ def test_sensors_that_sit_anyhow_stop_it() -> None:
 def test_an_analysis_goes_on_from_any_stage() -> None:
     whole = analysis()
     for stage in ("poses", "angles", "parameters"):
-        again = resume(whole, stage)
-        assert_same_figures(again.parameters, whole.parameters)
+        second_resumed_run = resume(whole, stage)
+        assert_same_figures(second_resumed_run.parameters, whole.parameters)
     strict = replace(
         PipelineConfig().squat, repetitions=replace(PipelineConfig().squat.repetitions, least_rad=2.0)
     )
@@ -114,20 +114,20 @@ def test_both_legs_of_a_take_are_measured_and_compared(name: str) -> None:
     assert a.legs is not None
     assert a.squats is not None
     assert a.angles is not None
-    found = {(p.name, p.side): p for p in a.parameters}
+    result = {(p.name, p.side): p for p in a.parameters}
     depths = np.degrees(truth.depths_rad)
-    of = {"right": depths, "left": depths}
+    source = {"right": depths, "left": depths}
     if name == "squats_both_legs":
-        of = {"right": depths[:5], "left": depths[5:]}
-    for side, true in of.items():
-        depth = found["squat_depth_deg", side]  # type: ignore[index]
+        source = {"right": depths[:5], "left": depths[5:]}
+    for side, true in source.items():
+        depth = result["squat_depth_deg", side]  # type: ignore[index]
         assert depth.n == len(true)
         assert depth.mean == pytest.approx(true.mean(), abs=2.0)
         end = side[0]
-        at = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
+        index = [r.bottom for leg in a.squats if leg.side == side for r in leg.repetitions if not r.excluded]
         standing = truth.subtract_standing()
         for joint, most in (("knee_flexion", 2.0), ("hip_flexion", 2.0), ("hip_rotation", 4.0)):
-            off = a.angles.angles[f"{joint}_{end}"][at] - standing[f"{joint}_{end}"][at]
+            off = a.angles.angles[f"{joint}_{end}"][index] - standing[f"{joint}_{end}"][index]
             assert np.degrees(np.abs(off)).max() < most, joint
     compared = {s.name: s for s in compare_sides(a.parameters)}
     assert set(compared) == set(MEASURES)
@@ -171,11 +171,11 @@ def test_the_figure_stands_on_its_feet(name: str) -> None:
 def test_what_legs_need_is_said() -> None:
     uniform = synchronise(made("squats_both_legs").recording)
     assert find_squat_sides(uniform) == ("left", "right")
-    worn = dict(uniform.sensors)
-    del worn["thigh_l"]
-    assert find_squat_sides(replace(uniform, sensors=worn)) == ("right",)
-    del worn["pelvis"]
-    assert refusal(replace(uniform, sensors=worn)) == "segments_missing"
+    mapping = dict(uniform.sensors)
+    del mapping["thigh_l"]
+    assert find_squat_sides(replace(uniform, sensors=mapping)) == ("right",)
+    del mapping["pelvis"]
+    assert refusal(replace(uniform, sensors=mapping)) == "segments_missing"
 
 
 def refusal(recording: UniformRecording) -> str:

@@ -22,8 +22,8 @@ from tests.helpers.mobgap import TRIALS, recording
 
 
 @cache
-def analysis(*worn: Segment, name: str = "fast_with_turns") -> TakeAnalysis:
-    return analyse(simulate_scenario(name, 1, worn=worn).recording)
+def analysis(*segments: Segment, name: str = "fast_with_turns") -> TakeAnalysis:
+    return analyse(simulate_scenario(name, 1, worn=segments).recording)
 
 
 def figures(a: TakeAnalysis) -> dict[str, Parameter]:
@@ -34,14 +34,14 @@ def figures(a: TakeAnalysis) -> dict[str, Parameter]:
 def test_a_single_pelvis_sensor_gives_cadence_steps_bouts_and_turns() -> None:
     a = analysis("pelvis")
     assert a.problem is None
-    found = figures(a)
-    assert found["cadence_spm"].mean == pytest.approx(124.0, rel=0.02)
-    assert found["step_time_s"].mean == pytest.approx(0.484, rel=0.02)
-    assert found["step_count"].mean == pytest.approx(89, abs=3)
-    assert found["walking_bout_count"].mean == 1
-    assert found["walking_duration_min"].mean == pytest.approx(0.71, abs=0.03)
-    assert found["turn_count"].mean == 3
-    assert found["turn_angle_deg"].mean == pytest.approx(180.0, abs=5.0)
+    result = figures(a)
+    assert result["cadence_spm"].mean == pytest.approx(124.0, rel=0.02)
+    assert result["step_time_s"].mean == pytest.approx(0.484, rel=0.02)
+    assert result["step_count"].mean == pytest.approx(89, abs=3)
+    assert result["walking_bout_count"].mean == 1
+    assert result["walking_duration_min"].mean == pytest.approx(0.71, abs=0.03)
+    assert result["turn_count"].mean == 3
+    assert result["turn_angle_deg"].mean == pytest.approx(180.0, abs=5.0)
     assert a.angles is None
     assert a.calibration is None
 
@@ -63,15 +63,15 @@ def test_its_files_read_back_to_the_same_numbers() -> None:
     assert len(files["steps.csv"].splitlines()) == 1 + len(a.measured.steps.steps)  # type: ignore[union-attr]
     bundle = load_bundle(files)
     assert bundle.parameters == a.parameters
-    again = measure_gait(read_tracks(files[NAME], bundle.events, bundle.angles))
-    assert [(p.name, p.n, p.reason) for p in again.parameters] == [
+    second_gait = measure_gait(read_tracks(files[NAME], bundle.events, bundle.angles))
+    assert [(p.name, p.n, p.reason) for p in second_gait.parameters] == [
         (p.name, p.n, p.reason) for p in a.parameters
     ]
     # accelerations are kept in single precision
-    for x, y in zip(again.parameters, a.parameters, strict=True):
+    for x, y in zip(second_gait.parameters, a.parameters, strict=True):
         assert (x.mean is None) == (y.mean is None)
         assert x.mean is None or x.mean == pytest.approx(y.mean, rel=1e-5)
-    assert again.bouts == a.measured.bouts  # type: ignore[union-attr]
+    assert second_gait.bouts == a.measured.bouts  # type: ignore[union-attr]
 
 
 @pytest.mark.slow
@@ -115,10 +115,10 @@ def test_what_cannot_be_calibrated_leaves_the_steps_of_the_trunk_and_says_why() 
     assert a.problem is None
     assert a.stopped_at is None
     assert figures(a)["cadence_spm"].mean == pytest.approx(124.0, rel=0.02)
-    told = {n.code: n.severity for n in a.notices}
-    assert told["trunk_alone"] == "warning"
-    assert {"no_rest", "not_still"} & set(told)
-    assert "error" not in told.values()
+    by_code = {n.code: n.severity for n in a.notices}
+    assert by_code["trunk_alone"] == "warning"
+    assert {"no_rest", "not_still"} & set(by_code)
+    assert "error" not in by_code.values()
     walked = analyse(replace(take, streams=streams))
     assert walked.calibration is not None
     assert walked.calibration.posture == "walking"

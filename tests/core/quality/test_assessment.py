@@ -1,4 +1,4 @@
-"""Wrong units and signs are errors, losses and copies are said, figures agree with the real take."""
+"""Wrong units and signs are errors, losses and copies are reported, values match the real trial."""
 
 from __future__ import annotations
 
@@ -124,9 +124,9 @@ def test_a_sensor_that_stopped_early_is_not_reported_again_as_a_gap() -> None:
         )
         uniform = synchronise(recording)
         assert [n.code for n in uniform.notices] == ["unequal_lengths"]
-        said = [n.message for n in assess(recording, uniform).notices if n.code == "gap"]
-        assert len(said) == len(gaps)
-        assert all(share in message for share, message in zip(gaps, said, strict=True))
+        text = [n.message for n in assess(recording, uniform).notices if n.code == "gap"]
+        assert len(text) == len(gaps)
+        assert all(share in message for share, message in zip(gaps, text, strict=True))
 
 
 @pytest.mark.parametrize(("lost_s", "told"), [(0.07, False), (0.3, True)])

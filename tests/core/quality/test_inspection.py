@@ -1,4 +1,4 @@
-"""What an upload holds, sensor by sensor, before anybody said who wears what."""
+"""Content of an upload by sensor, before any mapping."""
 
 from __future__ import annotations
 
@@ -22,13 +22,15 @@ ACC, GYR = signals(600, still=300)
 @pytest.mark.recorded
 def test_the_upload_page_learns_what_the_real_files_hold(neura: Recording) -> None:
     unmapped = Recording(neura.streams, {})
-    found = describe(unmapped)
-    text = json.dumps(found.to_json(), allow_nan=False)
+    description = describe(unmapped)
+    text = json.dumps(description.to_json(), allow_nan=False)
     assert "NaN" not in text
-    copies = {d.device_id: d.duplicate_of for d in found.devices if d.duplicate_of}
+    copies = {d.device_id: d.duplicate_of for d in description.devices if d.duplicate_of}
     assert copies == {"00B40C49": "00B40C44", "00B40C4A": "00B40C47"}
-    assert all(d.lost_pct == 0.0 and d.has_gyro and d.has_mag and d.rate_hz == 100.0 for d in found.devices)
-    assert found.duration_s == pytest.approx(25.02)
+    assert all(
+        d.lost_pct == 0.0 and d.has_gyro and d.has_mag and d.rate_hz == 100.0 for d in description.devices
+    )
+    assert description.duration_s == pytest.approx(25.02)
 
 
 @pytest.mark.slow
@@ -42,15 +44,17 @@ def test_a_pelvis_without_any_acceleration_is_described_all_the_same(until_s: fl
         none = (s.t_s < until_s) & (segment == "pelvis")
         acc = np.where(none[:, None], 0.0, s.acc)
         streams[f"s{i}"] = replace(s, device_id=f"s{i}", source="x", acc=acc)
-    found = describe(Recording(streams, {}))
-    assert "gravity_removed" in [n.code for d in found.devices for n in d.notices]
-    assert json.dumps(found.to_json(), allow_nan=False)
+    description = describe(Recording(streams, {}))
+    assert "gravity_removed" in [n.code for d in description.devices for n in d.notices]
+    assert json.dumps(description.to_json(), allow_nan=False)
 
 
 def test_losses_are_counted_between_the_first_and_the_last_sample() -> None:
     assert measure_losses(stream("a", ACC, GYR)) == (0.0, 0.0)
-    kept = np.delete(np.arange(600), np.arange(200, 230))
-    share, longest = measure_losses(stream("a", ACC[kept], GYR[kept], t_s=kept / 100.0))
+    stored_response = np.delete(np.arange(600), np.arange(200, 230))
+    share, longest = measure_losses(
+        stream("a", ACC[stored_response], GYR[stored_response], t_s=stored_response / 100.0)
+    )
     assert share == pytest.approx(30 / 600)
     assert longest == pytest.approx(0.3)
     # a row without its rate is lost as a packet is; half a sample of jitter is no hole
@@ -74,9 +78,9 @@ def test_a_copy_is_told_with_the_original_and_times_are_of_the_whole_upload() ->
     t_s = np.arange(600) / 100.0
     devices = [stream("a", ACC, GYR, t_s=t_s + 1.0), stream("b", ACC + 1.0, None, t_s=t_s + 3.0)]
     copy = replace(devices[0], device_id="c")
-    found = describe(Recording({x.device_id: x for x in (*devices, copy)}, {"a": None, "b": "pelvis"}))
-    a, b, c = found.devices
-    assert found.duration_s == pytest.approx(7.99)
+    description = describe(Recording({x.device_id: x for x in (*devices, copy)}, {"a": None, "b": "pelvis"}))
+    a, b, c = description.devices
+    assert description.duration_s == pytest.approx(7.99)
     assert (a.start_s, b.start_s) == (1.0, 3.0)
     assert a.duration_s == pytest.approx(5.99)
     assert (a.duplicate_of, b.duplicate_of, c.duplicate_of) == (None, None, "a")
@@ -84,10 +88,10 @@ def test_a_copy_is_told_with_the_original_and_times_are_of_the_whole_upload() ->
     assert (a.declared, b.declared, c.declared) == (True, True, False)
     assert (a.segment, b.segment, c.segment) == (None, "pelvis", None)
     assert (a.has_gyro, b.has_gyro, a.has_mag, a.has_orientation) == (True, False, False, False)
-    told = found.to_json()["devices"]
-    assert isinstance(told, list)
-    assert [d["units"]["gyr"] for d in told] == ["rad/s", None, "rad/s"]
-    assert [d["basis"] for d in told] == ["declared", "declared", None]
+    notices = description.to_json()["devices"]
+    assert isinstance(notices, list)
+    assert [d["units"]["gyr"] for d in notices] == ["rad/s", None, "rad/s"]
+    assert [d["basis"] for d in notices] == ["declared", "declared", None]
 
 
 def test_a_recording_of_hours_is_described_by_its_first_minutes() -> None:

@@ -1,4 +1,4 @@
-"""Live samples of a sensor that stops measuring: marked, told once and left out."""
+"""Live samples of a failed sensor: marked, reported once, excluded."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ def signals(n: int = 700) -> tuple[Floats, Floats]:
 
 def run(size: int) -> tuple[list[UniformBlock], list[Notice], StuckSensors, list[tuple[Segment, ...]]]:
     acc, gyr = signals()
-    here = np.ones((size, 2), np.bool_)
+    mask = np.ones((size, 2), np.bool_)
     watch = StuckSensors(("pelvis", "foot_l"), RATE)
     blocks, notices, now = [], [], []
     for k in range(0, len(acc), size):
         part = slice(k, k + size)
         t_s = np.arange(k, k + size) / RATE
-        block, found = watch.push(UniformBlock(k, t_s, acc[part], gyr[part], here, here))
+        block, frame = watch.push(UniformBlock(k, t_s, acc[part], gyr[part], mask, mask))
         blocks.append(block)
-        notices += found
+        notices += frame
         now.append(watch.now)
     return blocks, notices, watch, now
 
@@ -56,7 +56,7 @@ def test_a_frozen_sensor_is_left_out_told_once_and_taken_in_again(size: int) -> 
 
 
 def test_left_out_for_good_is_told_from_a_pause() -> None:
-    """A frozen sensor may come back; only what is broken or clipped is out."""
+    """Frozen sensors may recover; only stuck or clipped ones are excluded."""
     blocks, _, _, _ = run(50)
     for block in blocks:
         assert block.out is not None
@@ -67,9 +67,9 @@ def test_left_out_for_good_is_told_from_a_pause() -> None:
 def test_a_dead_axis_is_out_from_when_it_is_known() -> None:
     acc, gyr = signals()
     gyr[:, 0, 1] = 0.013
-    here = np.ones(acc.shape[:2], np.bool_)
+    mask = np.ones(acc.shape[:2], np.bool_)
     watch = StuckSensors(("pelvis", "foot_l"), RATE)
-    block, notices = watch.push(UniformBlock(0, np.arange(len(acc)) / RATE, acc, gyr, here, ~here))
+    block, notices = watch.push(UniformBlock(0, np.arange(len(acc)) / RATE, acc, gyr, mask, ~mask))
     assert ("channel_stuck", "pelvis") in [(n.code, n.sensor) for n in notices]
     assert watch.now == ("pelvis",)
     assert block.out is not None

@@ -24,7 +24,7 @@ def walk(
     seconds: float = 10.0,
     mount: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Pelvis and legs of somebody who starts along +x; phases are against the rate of leg 1 less leg 2."""
+    """Pelvis and legs of a person starting along +x; phases are relative to the rate of leg 1 less leg 2."""
     t = np.arange(round((rest_s + seconds) * RATE)) / RATE - rest_s
     moving, cycle = (t >= 0.0).astype(float), 2.0 * np.pi * STRIDE_HZ * t
     first, second = (moving * (2.0 + sign * 1.5 * np.cos(cycle)) for sign in (1.0, -1.0))

@@ -56,7 +56,7 @@ def test_facts_survive_short_and_holed_signals() -> None:
 
 
 def test_turning_on_the_spot_while_the_trunk_is_level_is_no_wrong_unit() -> None:
-    """mobgap_lowback Test5: the quietest second of the accelerometer lies in a turn."""
+    """mobgap_lowback Test5: the quietest second of the accelerometer is within a turn."""
     still = np.tile([0.0, 0.0, GRAVITY], (1000, 1))
     acc = still + np.random.default_rng(0).normal(0.0, 0.05, still.shape)
     acc[400:600] = still[400:600]

@@ -68,8 +68,8 @@ def flickering(acc: Floats, gyr: Floats, k: int) -> None:
 
 def looped(acc: Floats, gyr: Floats, k: int) -> None:
     """The last packet of 20 samples, again and again."""
-    again = k + np.arange(len(acc) - k) % 20
-    acc[k:], gyr[k:] = acc[again], gyr[again]
+    second = k + np.arange(len(acc) - k) % 20
+    acc[k:], gyr[k:] = acc[second], gyr[second]
 
 
 def narrow(acc: Floats, gyr: Floats, k: int) -> None:
@@ -101,31 +101,31 @@ def test_a_sensor_that_does_not_measure_is_named_and_left_out_from_there(
     for at_s in (0.0,) if spoil is narrow else (0.0, 21.0):
         # the walk begins at 6 s; who repeats the last packet before it stands still
         at_s = 8.0 if spoil in (frozen, looped) and at_s == 0.0 else at_s
-        found = mark_stuck(spoilt(comfortable(), segment, spoil, at_s))
-        assert told(found.notices) == [(code, segment)]
-        (notice,) = (n for n in found.notices if n.code == code)
+        stuck = mark_stuck(spoilt(comfortable(), segment, spoil, at_s))
+        assert told(stuck.notices) == [(code, segment)]
+        (notice,) = (n for n in stuck.notices if n.code == code)
         assert len(notice.message.split()) <= 27
-        valid = found.sensors[segment].valid
-        first = round(at_s * found.rate_hz)
+        valid = stuck.sensors[segment].valid
+        first = round(at_s * stuck.rate_hz)
         begun = int(np.argmin(valid))
         # of a range, or of a new value now and then, nothing tells before somebody moves
         late = spoil in (narrow, flickering)
         assert first - 1 <= begun <= (max(first, 600) + 300 if late else first + 30)
         assert not valid[begun + 1 :].any()
-        assert all(x.valid.all() for s, x in found.sensors.items() if s != segment)
-        assert (segment in drop_stuck_sensors(found).sensors) == (at_s > 0.5 * found.t_s[-1])
+        assert all(x.valid.all() for s, x in stuck.sensors.items() if s != segment)
+        assert (segment in drop_stuck_sensors(stuck).sensors) == (at_s > 0.5 * stuck.t_s[-1])
 
 
 def test_a_sensor_that_repeats_a_sample_for_a_while_is_there_again_with_the_next_new_one() -> None:
     def pause(acc: Floats, gyr: Floats, k: int) -> None:
         acc[k : k + 150], gyr[k : k + 150] = acc[k], gyr[k]
 
-    found = mark_stuck(spoilt(comfortable(), "shank_r", pause, 20.0))
-    valid = found.sensors["shank_r"].valid
-    assert told(found.notices) == [("sensor_frozen", "shank_r")]
+    stuck = mark_stuck(spoilt(comfortable(), "shank_r", pause, 20.0))
+    valid = stuck.sensors["shank_r"].valid
+    assert told(stuck.notices) == [("sensor_frozen", "shank_r")]
     assert 2000 <= np.flatnonzero(~valid)[0] <= 2002
     assert np.count_nonzero(~valid) == pytest.approx(150, abs=2)
-    assert "shank_r" in drop_stuck_sensors(found).sensors
+    assert "shank_r" in drop_stuck_sensors(stuck).sensors
 
 
 def test_any_division_into_blocks_finds_the_same() -> None:
@@ -141,19 +141,19 @@ def test_any_division_into_blocks_finds_the_same() -> None:
     edges = np.unique(np.random.default_rng(0).integers(0, len(acc), 300))
     parts = []
     for a, b in zip([0, *edges], [*edges, len(acc)], strict=True):
-        found = watch.push(acc[a:b], gyr[a:b], valid[a:b])
-        parts.append(found or (np.zeros((b - a, len(x)), np.int64),) * 2)
+        frame = watch.push(acc[a:b], gyr[a:b], valid[a:b])
+        parts.append(frame or (np.zeros((b - a, len(x)), np.int64),) * 2)
     for ours, theirs in zip(whole, zip(*parts, strict=True), strict=True):
         np.testing.assert_array_equal(ours, np.concatenate(theirs))
 
 
 def of_arrays(rate_hz: float, sensors: dict[str, tuple[Floats, Floats]]) -> UniformRecording:
-    """Sensors under their own names: this rule does not ask where they are worn."""
+    """Sensors under their own names, since this rule ignores placement."""
     n = min(len(acc) for acc, _ in sensors.values())
-    here = np.ones(n, np.bool_)
+    mask = np.ones(n, np.bool_)
     signals = {
         s: SensorSignals(
-            s, np.ascontiguousarray(a[:n]), np.ascontiguousarray(g[:n]), None, here.copy(), ~here
+            s, np.ascontiguousarray(a[:n]), np.ascontiguousarray(g[:n]), None, mask.copy(), ~mask
         )
         for s, (a, g) in sensors.items()
     }
@@ -183,17 +183,21 @@ def qmt() -> list[UniformRecording]:
     data = loadmat(
         data_folder("qmt_fullbody") / "full_body_example_data.mat", squeeze_me=True, struct_as_record=False
     )
-    found = {k: x for k, x in data.items() if hasattr(x, "gyr")}
-    return [of_arrays(100.0, {k: (np.array(x.acc, float), np.array(x.gyr, float)) for k, x in found.items()})]
+    result = {k: x for k, x in data.items() if hasattr(x, "gyr")}
+    return [
+        of_arrays(100.0, {k: (np.array(x.acc, float), np.array(x.gyr, float)) for k, x in result.items()})
+    ]
 
 
 def feet_of_gaitmap() -> list[UniformRecording]:
-    found = []
+    result = []
     for name in gaitmap.COPIES:
         x = gaitmap.signals(name)
         sides = {"l": x[:, :6], "r": x[:, 6:]}
-        found.append(of_arrays(gaitmap.RATE, {k: (s[:, :3], np.radians(s[:, 3:])) for k, s in sides.items()}))
-    return found
+        result.append(
+            of_arrays(gaitmap.RATE, {k: (s[:, :3], np.radians(s[:, 3:])) for k, s in sides.items()})
+        )
+    return result
 
 
 def lower_backs() -> list[UniformRecording]:
@@ -201,8 +205,8 @@ def lower_backs() -> list[UniformRecording]:
 
 
 def awinda_samples() -> list[UniformRecording]:
-    """MT Manager exports of several makers' samples, each file by itself."""
-    found = []
+    """MT Manager exports of several makers' samples, each file separately."""
+    result = []
     for folder, pattern in (
         (data_folder("mtw_csv_sample"), "*.csv"),
         (data_folder("opensense_xsens_apdm"), "xsens_formats/*.txt"),
@@ -214,8 +218,8 @@ def awinda_samples() -> list[UniformRecording]:
             for device, s in recording.streams.items():
                 if s.gyr is not None:
                     good = np.isfinite(s.acc).all(axis=1) & np.isfinite(s.gyr).all(axis=1)
-                    found.append(of_arrays(s.rate_hz, {device: (s.acc[good], s.gyr[good])}))
-    return found
+                    result.append(of_arrays(s.rate_hz, {device: (s.acc[good], s.gyr[good])}))
+    return result
 
 
 def opals() -> list[UniformRecording]:
@@ -237,9 +241,9 @@ NAMES = ("neura", "gaitmap", "ipol", "qmt", "mobgap", "awinda", "opal")
 @pytest.mark.recorded
 @pytest.mark.parametrize("takes", REAL, ids=NAMES)
 def test_real_sensors_all_measure(takes: Callable[[], list[UniformRecording]]) -> None:
-    found = takes()
-    assert found
-    for recording in found:
+    result = takes()
+    assert result
+    for recording in result:
         assert mark_stuck(recording) is recording
         # what a coarse export leaves of them: a tenth of m/s², one degree per second
         rounded = coarse(recording, 0.1, np.radians(1.0))
@@ -283,25 +287,25 @@ def without(segment: Segment, spoil: Spoil) -> TakeAnalysis:
 @pytest.mark.parametrize("spoil", [dead_gyroscope, stuck_accelerometer], ids=["gyroscope", "accelerometer"])
 @pytest.mark.parametrize("segment", ["pelvis", "thigh_l"])
 def test_a_dead_channel_leaves_no_plausible_number_of_its_sensor(segment: Segment, spoil: Spoil) -> None:
-    """What the others measure stays as it was; what needs this sensor is withheld, not made up."""
-    found = without(segment, spoil)
-    assert told(found.notices) == [("channel_stuck", segment)]
-    assert found.quality.level == "poor"
-    assert found.poses is not None
-    assert found.poses.method != "erkf_smoothed"
-    assert found.poses.reduced == "sensor_failed"
-    assert found.orientations is not None
-    assert segment not in found.orientations.q
+    """Other sensors are unaffected; parameters that need this sensor are suppressed."""
+    result = without(segment, spoil)
+    assert told(result.notices) == [("channel_stuck", segment)]
+    assert result.quality.level == "poor"
+    assert result.poses is not None
+    assert result.poses.method != "erkf_smoothed"
+    assert result.poses.reduced == "sensor_failed"
+    assert result.orientations is not None
+    assert segment not in result.orientations.q
     good = {(p.name, p.side): p for p in sound().parameters}
     times = 0
-    for p in found.parameters:
+    for p in result.parameters:
         was = good.get((p.name, p.side))
         if p.name.endswith(("_s", "_pct")) and was is not None and p.mean is not None:
             assert was.mean is not None
             assert p.mean == pytest.approx(was.mean, rel=0.05, abs=1.0 if p.unit == "%" else 0.01), p.name
             times += 1
     assert times >= 20
-    trunk = [p for p in found.parameters if p.name.startswith(("harmonic", "step_reg", "stride_reg"))]
+    trunk = [p for p in result.parameters if p.name.startswith(("harmonic", "step_reg", "stride_reg"))]
     assert trunk
     if segment == "pelvis":
         assert all(p.mean is None and p.reason for p in trunk)
@@ -311,15 +315,15 @@ def test_a_take_without_a_sensor_that_measures_stops_with_a_sentence() -> None:
     recording = cut(comfortable(), 0.0, 30.0)
     for segment in recording.sensors:
         recording = spoilt(recording, segment, no_acceleration, 0.0)
-    found = analyse(recording_of(recording))
-    assert found.problem is not None
-    assert found.problem.code == "no_working_sensor"
-    assert found.parameters == ()
+    analysis = analyse(recording_of(recording))
+    assert analysis.problem is not None
+    assert analysis.problem.code == "no_working_sensor"
+    assert analysis.parameters == ()
 
 
 @pytest.mark.sweep
 def test_a_dead_gyroscope_is_left_out_of_a_live_take_before_it_starts() -> None:
-    """Known while the walk for calibration goes on, in the words that the file gets; the others go on."""
+    """Detected during the calibration walk, with the same message as for files; other sensors continue."""
     take = cut(comfortable(), 0.0, 26.0)
     broken = spoilt(take, "pelvis", dead_gyroscope, 0.0)
     online, frames = live(broken)
@@ -341,9 +345,9 @@ def test_a_thigh_that_stops_measuring_live_has_no_angles_from_then_on() -> None:
     assert frames[-1].stage == "running"
     known_at = next(f.t_s for f in frames if any(n.code in CODES for n in f.notices))
     assert 22.9 <= known_at <= 24.5
-    after = [f for f in frames if f.t_s > known_at]
-    assert all(np.isnan(f.angles["knee_flexion_l"]) and np.isnan(f.angles["hip_flexion_l"]) for f in after)
-    assert np.isfinite(after[-1].angles["knee_flexion_r"])
+    final = [f for f in frames if f.t_s > known_at]
+    assert all(np.isnan(f.angles["knee_flexion_l"]) and np.isnan(f.angles["hip_flexion_l"]) for f in final)
+    assert np.isfinite(final[-1].angles["knee_flexion_r"])
     late = [s for f in frames for s in f.strides if s.side == "left" and s.start_s > known_at]
     assert late
     assert all(s.values["knee_flexion_rom_deg"] is None for s in late)
@@ -351,7 +355,7 @@ def test_a_thigh_that_stops_measuring_live_has_no_angles_from_then_on() -> None:
 
 @pytest.mark.parametrize(("start_s", "length"), [(20.0, 4), (20.0, 30), (20.3, 30), (20.6, 45), (20.9, 40)])
 def test_a_hiccup_in_which_a_foot_swings_is_lost(start_s: float, length: int) -> None:
-    """Whether the sample that is sent again is one of swing or of a foot that stands."""
+    """Whether the repeated sample is from swing or stance."""
 
     def pause(acc: Floats, gyr: Floats, k: int) -> None:
         acc[k + 1 : k + length], gyr[k + 1 : k + length] = acc[k], gyr[k]
@@ -359,9 +363,9 @@ def test_a_hiccup_in_which_a_foot_swings_is_lost(start_s: float, length: int) ->
     first = round(100 * start_s)
     rate = np.linalg.norm(comfortable().sensors["foot_r"].gyr, axis=1)
     assert rate[first : first + length].max() > 1.0
-    found = mark_stuck(spoilt(comfortable(), "foot_r", pause, start_s))
-    assert told(found.notices) == [("sensor_frozen", "foot_r")]
-    lost = np.flatnonzero(~found.sensors["foot_r"].valid)
+    stuck = mark_stuck(spoilt(comfortable(), "foot_r", pause, start_s))
+    assert told(stuck.notices) == [("sensor_frozen", "foot_r")]
+    lost = np.flatnonzero(~stuck.sensors["foot_r"].valid)
     assert first <= lost[0] <= first + 1
     assert lost[-1] in (first + length - 1, first + length)
     assert len(lost) == lost[-1] - lost[0] + 1

@@ -1,4 +1,4 @@
-"""Parts of the rule on stuck channels: what counts as rest, as the end of a range, and as a loop."""
+"""Parts of the stuck-channel rule: rest, full scale, loops."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def test_the_end_of_a_range_is_met_within_a_hundredth() -> None:
 
 def test_a_loop_is_told_by_its_shortest_packet() -> None:
     ring, loop = np.full((6, 6), np.nan), np.zeros(6, np.int64)
-    told = []
+    notices = []
     for k in range(9):
         x = np.full(6, float(k % 2))
-        told.append(int(follow_loops(ring, loop, k % 6, 0, x, 4.0)))
+        notices.append(int(follow_loops(ring, loop, k % 6, 0, x, 4.0)))
     # from the third sample on each equals the one two before it
-    assert told == [-1, -1, -1, -1, -1, 4, 5, 6, 7]
+    assert notices == [-1, -1, -1, -1, -1, 4, 5, 6, 7]
 
 
 def test_a_sensor_at_rest_may_repeat_its_sample_and_a_moving_one_may_not() -> None:
@@ -32,8 +32,8 @@ def test_a_sensor_at_rest_may_repeat_its_sample_and_a_moving_one_may_not() -> No
     acc, gyr, valid = np.zeros((10, 1, 3)), np.zeros((10, 1, 3)), np.ones((10, 1), np.bool_)
     acc[..., 2] = GRAVITY
     assert watch.push(acc, gyr, valid) is None
-    found = watch.push(acc, gyr + 5.0, valid)
-    assert found is not None
-    faults = set(found[0].ravel().tolist())
+    frame = watch.push(acc, gyr + 5.0, valid)
+    assert frame is not None
+    faults = set(frame[0].ravel().tolist())
     assert FROZEN in faults
     assert LOOPED not in faults

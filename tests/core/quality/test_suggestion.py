@@ -1,4 +1,4 @@
-"""Who wears what, by declaration, name or movement; where it cannot honestly be said, nothing."""
+"""Placement by declaration, name or movement, or no suggestion."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ACC, GYR = signals(2000, still=500)
 
 
 def nameless(recording: Recording) -> tuple[Recording, dict[str, Segment]]:
-    """The same sensors without any name or mapping, and what they truly are."""
+    """The same sensors without names or mapping, and their true segments."""
     ids = {d: f"id{i}" for i, d in enumerate(recording.streams)}
     streams = {ids[d]: replace(s, device_id=ids[d], source="x") for d, s in recording.streams.items()}
     return Recording(streams, {}), {ids[d]: s for d, s in recording.segments.items() if s}
@@ -50,9 +50,9 @@ def test_a_walk_without_rest_before_it_has_legs_but_no_sides(neura: Recording) -
         )
         for d, s in neura.streams.items()
     }
-    found = suggest(Recording(cut, {}))
-    assert {s.segment for s in found.values()} == {None, "pelvis"}
-    parts = {d: (s.part, s.leg) for d, s in found.items()}
+    suggestion = suggest(Recording(cut, {}))
+    assert {s.segment for s in suggestion.values()} == {None, "pelvis"}
+    parts = {d: (s.part, s.leg) for d, s in suggestion.items()}
     assert {parts[d][0] for d in ("00B40C55", "00B40C48")} == {"foot"}
     legs = {(parts[d][1], segment[-1]) for d, segment in NINE.items() if segment and "_" in segment}
     assert len(legs) == 2
@@ -81,9 +81,9 @@ def test_names_are_believed_before_movement() -> None:
 
 @pytest.mark.recorded
 def test_a_declared_mapping_is_kept_as_the_suggestion(neura: Recording) -> None:
-    found = suggest(neura)
-    assert {found[d].segment for d in NINE} == set(NINE.values())
-    assert found["00B40C55"].basis == "declared"
+    suggestion = suggest(neura)
+    assert {suggestion[d].segment for d in NINE} == set(NINE.values())
+    assert suggestion["00B40C55"].basis == "declared"
 
 
 def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None:
@@ -100,8 +100,8 @@ def test_two_sensors_that_name_their_side_alone_are_taken_for_the_feet() -> None
 
 def test_a_declared_sensor_takes_its_segment_from_those_that_only_have_its_name() -> None:
     streams = {d: stream(d, ACC + i, GYR) for i, d in enumerate(("one", "Pelvis", "LTibia", "spare"))}
-    found = suggest(Recording(streams, {"one": "pelvis", "spare": None}))
-    assert found == {
+    suggestion = suggest(Recording(streams, {"one": "pelvis", "spare": None}))
+    assert suggestion == {
         "one": Suggestion("pelvis", "declared", "pelvis"),
         "Pelvis": Suggestion(),
         "LTibia": Suggestion("shank_l", "label", "shank"),

@@ -1,4 +1,4 @@
-"""Wrong units and signs at the limits where they are told, and how gravely."""
+"""Wrong units and signs at their reporting limits, and severity."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ ACC = np.tile([0.0, 0.0, GRAVITY], (20, 1))
 
 
 def told(facts: Facts, acc: Floats = ACC, quat: Floats | None = None) -> list[tuple[str, str]]:
-    found = list_suspicions("A7", facts, acc, quat)
-    assert all(n.sensor == "A7" and "A7" in n.message for n in found)
-    return [(n.code, n.severity) for n in found]
+    suspicions = list_suspicions("A7", facts, acc, quat)
+    assert all(n.sensor == "A7" and "A7" in n.message for n in suspicions)
+    return [(n.code, n.severity) for n in suspicions]
 
 
 UNIT, WARNED = ("unit_suspect", "error"), ("unit_suspect", "warning")
@@ -101,9 +101,9 @@ def test_without_rest_the_middle_of_the_take_is_near_gravity(
 def test_a_rate_beyond_any_sensor_at_rest_or_in_motion_is_the_wrong_unit(
     facts: Facts, words: str | None
 ) -> None:
-    found = list_suspicions("A7", facts, ACC, None)
-    assert [(n.code, n.severity) for n in found] == ([] if words is None else [UNIT])
-    assert all(words is not None and words in n.message for n in found)
+    suspicions = list_suspicions("A7", facts, ACC, None)
+    assert [(n.code, n.severity) for n in suspicions] == ([] if words is None else [UNIT])
+    assert all(words is not None and words in n.message for n in suspicions)
 
 
 @pytest.mark.parametrize(("degrees", "told_of"), [(0.0, False), (119.0, False), (121.0, True), (180.0, True)])

@@ -1,4 +1,4 @@
-"""Gravity carried by the gyroscope: its own axes fit, all others are found, and what is not judged."""
+"""Gravity carried along by the gyroscope: correct axes fit, others are detected, undecided cases."""
 
 from __future__ import annotations
 
@@ -29,14 +29,14 @@ def moved(shaking_m: float = 0.004) -> SensorSignals:
     shake = shaking_m * (2.0 * np.pi * 2.0) ** 2 * fade * np.sin(4.0 * np.pi * t)
     force = np.stack((shake, -shake, GRAVITY + shake), axis=1)
     acc = rotate(conjugate(q[1:]), force[1:]) + rng.normal(0.0, 0.02, (1500, 3))
-    there = np.ones(1500, np.bool_)
-    return SensorSignals("a", acc, gyr, None, there, ~there)
+    mask = np.ones(1500, np.bool_)
+    return SensorSignals("a", acc, gyr, None, mask, ~mask)
 
 
-def with_gyroscope(times: Floats, of: SensorSignals | None = None) -> SensorSignals:
+def with_gyroscope(times: Floats, source: SensorSignals | None = None) -> SensorSignals:
     """The same sensor whose gyroscope has to be multiplied by this."""
-    of = of or moved()
-    return of.change(gyr=of.gyr @ np.linalg.inv(times).T)
+    source = source or moved()
+    return source.change(gyr=source.gyr @ np.linalg.inv(times).T)
 
 
 def test_every_way_to_name_and_sign_three_axes_is_tried_once_and_the_stated_one_first() -> None:
@@ -98,9 +98,9 @@ def test_too_few_averages_say_nothing() -> None:
     assert fit_axes(moved(), RATE, seven) is None
     assert not refuses_choice(moved(), RATE, CHOICES[REVERSED], seven)
     # a lost sample takes the averages that would be carried over it
-    there = np.ones(len(moved().acc), np.bool_)
-    there[500] = False
-    fit = fit_axes(moved().change(valid=there), RATE, PARAMS)
+    mask = np.ones(len(moved().acc), np.bool_)
+    mask[500] = False
+    fit = fit_axes(moved().change(valid=mask), RATE, PARAMS)
     assert fit is not None
     assert fit.windows == 3
 

@@ -1,4 +1,4 @@
-"""A wrong set-up is found and a repair proposed, which makes the recording what it was."""
+"""Wrong set-ups are detected, and the proposed correction restores the recording."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ LEFT_HANDED = np.diag([-1.0, 1.0, 1.0])
 
 @cache
 def take() -> Recording:
-    """Seven sensors of somebody whose left leg walks otherwise than the right one."""
+    """Seven sensors of a person with different left and right legs."""
     return simulate_scenario("hemiparetic", seed=5).recording
 
 
 def change_all(acc: object, gyr: object) -> Recording:
-    found = take()
+    result = take()
     for segment in take().segments.values():
         if segment is not None:
-            found = change_axes(found, segment, acc, gyr)  # type: ignore[arg-type]
-    return found
+            result = change_axes(result, segment, acc, gyr)  # type: ignore[arg-type]
+    return result
 
 
 def require(recording: Recording) -> SetupRepair:
@@ -68,18 +68,18 @@ def test_one_sensor_with_wrong_signs_is_found_and_put_right(
 
 @pytest.mark.sweep
 def test_a_file_with_left_handed_axes_is_told_from_one_with_a_turned_gyroscope() -> None:
-    both, gyroscope = require(change_all(LEFT_HANDED, LEFT_HANDED)), require(change_all(1.0, -1.0))
+    pair, gyroscope = require(change_all(LEFT_HANDED, LEFT_HANDED)), require(change_all(1.0, -1.0))
     against = ("-x", "-y", "-z")
-    assert set(both.corrections.values()) == {SensorCorrection(acc_axes=against, gyr_axes=against)}
+    assert set(pair.corrections.values()) == {SensorCorrection(acc_axes=against, gyr_axes=against)}
     assert set(gyroscope.corrections.values()) == {SensorCorrection(gyr_axes=against)}
 
 
 @pytest.mark.sweep
 def test_units_are_proposed_sensor_by_sensor() -> None:
     g, deg = change_axes(take(), "shank_l", acc=1.0 / GRAVITY), change_all(1.0, np.degrees(1.0))
-    found = require(g)
-    assert found.kind == "units"
-    assert [x.acc_times for x in found.corrections.values()] == [pytest.approx(GRAVITY)]
+    result = require(g)
+    assert result.kind == "units"
+    assert [x.acc_times for x in result.corrections.values()] == [pytest.approx(GRAVITY)]
     assert [x.gyr_times for x in require(deg).corrections.values()] == [pytest.approx(np.radians(1.0))] * 7
 
 
@@ -126,25 +126,25 @@ def test_feet_alone_cannot_say_whether_a_file_is_left_handed() -> None:
 @pytest.mark.slow
 def test_an_analysis_stops_at_a_wrong_set_up_unless_told_not_to() -> None:
     wrong = change_axes(take(), "foot_l", gyr=-1.0)
-    found = analyse(wrong)
-    assert found.problem is not None
-    assert found.problem.code == "setup_wrong"
-    assert found.stopped_at == "quality"
-    assert found.setup is not None
-    again = analyse(apply_repair(wrong, found.setup))
-    assert (again.problem, again.setup) == (None, None)
-    kept = analyse(wrong, PipelineConfig(setup=SetupParams(refuse=False)))
-    assert kept.problem is None
-    assert "setup_wrong" in {n.code for n in kept.notices}
+    analysis = analyse(wrong)
+    assert analysis.problem is not None
+    assert analysis.problem.code == "setup_wrong"
+    assert analysis.stopped_at == "quality"
+    assert analysis.setup is not None
+    second_analysis = analyse(apply_repair(wrong, analysis.setup))
+    assert (second_analysis.problem, second_analysis.setup) == (None, None)
+    stored_analysis = analyse(wrong, PipelineConfig(setup=SetupParams(refuse=False)))
+    assert stored_analysis.problem is None
+    assert "setup_wrong" in {n.code for n in stored_analysis.notices}
 
 
 def test_a_repair_completes_a_manifest_and_earlier_corrections() -> None:
     repair = SetupRepair("axes", (), 2.0, corrections={"A": SensorCorrection(acc_axes=("-x", "-y", "-z"))})
-    before = {"sensors": {"A": "pelvis"}, "corrections": {"a": {"acc_axes": ["-x", "y", "z"]}, "B": {}}}
-    assert repair.complete_manifest(before) == {
+    initial = {"sensors": {"A": "pelvis"}, "corrections": {"a": {"acc_axes": ["-x", "y", "z"]}, "B": {}}}
+    assert repair.complete_manifest(initial) == {
         "sensors": {"A": "pelvis"},
         "corrections": {"B": {}, "A": {"acc_axes": ["x", "-y", "-z"]}},
     }
     labels = SetupRepair("labels", (), 2.0, {"A": "foot_l"})
-    said = labels.complete_manifest({"sensors": {"a": "foot_r", "C": None}})
-    assert said == {"sensors": {"C": None, "A": "foot_l"}}
+    complete_manifest = labels.complete_manifest({"sensors": {"a": "foot_r", "C": None}})
+    assert complete_manifest == {"sensors": {"C": None, "A": "foot_l"}}

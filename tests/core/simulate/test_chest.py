@@ -44,8 +44,8 @@ def test_the_day_has_the_figures_of_the_specification(day: ChestSimulation) -> N
 def test_rising_from_a_chair_lifts_the_chest_by_its_height(day: ChestSimulation) -> None:
     truth = day.truth
     for phase in (p for p in truth.phases if p.kind == "sit_to_stand"):
-        before, after = np.interp((phase.start_s, phase.end_s), truth.t_s, truth.height_m)
-        assert after - before == pytest.approx(0.40, abs=1e-9)
+        initial, final = np.interp((phase.start_s, phase.end_s), truth.t_s, truth.height_m)
+        assert final - initial == pytest.approx(0.40, abs=1e-9)
 
 
 def test_the_trunk_leans_before_the_body_rises(day: ChestSimulation) -> None:
@@ -92,8 +92,8 @@ def test_phases_cover_the_take_without_gaps(day: ChestSimulation) -> None:
     phases = day.truth.phases
     assert phases[0].start_s == 0.0
     assert phases[-1].end_s == pytest.approx(day.truth.t_s[-1])
-    for before, after in itertools.pairwise(phases):
-        assert before.end_s == after.start_s
+    for initial, final in itertools.pairwise(phases):
+        assert initial.end_s == final.start_s
 
 
 def test_one_sits_down_from_walking_like_from_standing() -> None:
@@ -107,11 +107,11 @@ def test_one_sits_down_from_walking_like_from_standing() -> None:
 
 
 def test_its_recording_is_one_sensor_on_the_chest_turned_as_mounted() -> None:
-    made = simulate_day(DAY, seed=6, setup=RecordingSetup(noise=None))
-    assert made.recording.protocol == "activity"
-    assert set(made.recording.segments.values()) == {"chest"}
+    simulation = simulate_day(DAY, seed=6, setup=RecordingSetup(noise=None))
+    assert simulation.recording.protocol == "activity"
+    assert set(simulation.recording.segments.values()) == {"chest"}
     plain = simulate_day(DAY, seed=6, setup=EXACT)
-    turned = rotate(made.truth.mount.q_segment_sensor, made.ideal["chest"].gyr)
+    turned = rotate(simulation.truth.mount.q_segment_sensor, simulation.ideal["chest"].gyr)
     assert turned == pytest.approx(plain.ideal["chest"].gyr, abs=1e-6)
 
 

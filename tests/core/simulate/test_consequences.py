@@ -1,4 +1,4 @@
-"""What goes wrong on the way from the sensor reaches the analysis, which says so or suffers as known."""
+"""Device errors reach the analysis, which reports them or degrades as documented."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ ROOM = tuple(Dipole((x, 0.4, 0.4), (0.0, 0.05, 0.0)) for x in (2.0, 5.0, 8.0, 11
 def told(
     setup: RecordingSetup = SHAKEN, impact: float = 1.0, repair: bool = True
 ) -> tuple[Simulation, TakeAnalysis]:
-    made = simulate(SCRIPT, Walker(impact=impact), 3, setup)
+    simulation = simulate(SCRIPT, Walker(impact=impact), 3, setup)
     config = PipelineConfig(agreement=AgreementParams(lags=LagParams(repair=repair)))
-    return made, analyse(made.recording, config)
+    return simulation, analyse(simulation.recording, config)
 
 
-def error_deg(made: Simulation, found: TakeAnalysis, name: str) -> float:
-    assert found.angles is not None
-    truth, angles = made.truth, found.angles.angles[name]
+def error_deg(result: Simulation, actual: TakeAnalysis, name: str) -> float:
+    assert actual.angles is not None
+    truth, angles = result.truth, actual.angles.angles[name]
     walking = (truth.t_s > truth.stands[0][1]) & (truth.t_s < truth.stands[-1][0])
     n = min(len(angles), len(truth.t_s))
     difference = (angles[:n] - truth.subtract_standing()[name][:n])[walking[:n]]
@@ -45,18 +45,18 @@ def test_a_healthy_walk_is_told_without_a_word() -> None:
 
 @pytest.mark.slow
 def test_steps_beyond_the_range_of_the_feet_are_told() -> None:
-    made, found = told(impact=3.0)
-    assert made.clipped["foot_l"].mean() > 0.003
-    assert {n.sensor for n in found.notices if n.code == "saturated"} == {"foot_l", "foot_r"}
+    result, results = told(impact=3.0)
+    assert result.clipped["foot_l"].mean() > 0.003
+    assert {n.sensor for n in results.notices if n.code == "saturated"} == {"foot_l", "foot_r"}
 
 
 @pytest.mark.slow
 def test_iron_beside_the_walkway_is_told_and_costs_nothing() -> None:
-    made, found = told(RecordingSetup(dipoles=ROOM))
-    assert {n.code for n in found.notices} == {"magnetic_disturbed"}
+    result, results = told(RecordingSetup(dipoles=ROOM))
+    assert {n.code for n in results.notices} == {"magnetic_disturbed"}
     for name in ("hip_flexion_l", "knee_flexion_l"):
         clean = error_deg(*told(RecordingSetup()), name)
-        assert error_deg(made, found, name) == pytest.approx(clean, abs=1e-9)
+        assert error_deg(result, results, name) == pytest.approx(clean, abs=1e-9)
 
 
 @pytest.mark.parametrize(("late_s", "expected"), [(0.01, 1.1), (0.02, 2.1)])
@@ -66,10 +66,10 @@ def test_a_clock_that_lags_at_the_thighs_costs_what_the_specification_measured(
 ) -> None:
     """docs/science/simulation.md, "Devices": 10 ms 1.1°, 20 ms 2.1° at hip and knee, unrepaired."""
     late = replace(SHAKEN, lags=(Lag("thigh_l", late_s), Lag("thigh_r", late_s)))
-    made, found = told(late, repair=False)
+    result, results = told(late, repair=False)
     if late_s > 0.012:
-        assert [n.code for n in found.notices] == ["sensor_late"] * 2
+        assert [n.code for n in results.notices] == ["sensor_late"] * 2
         assert error_deg(*told(late), "knee_flexion_r") < 0.6
     for name in ("hip_flexion_r", "knee_flexion_r"):
-        assert error_deg(made, found, name) == pytest.approx(expected, abs=0.25)
+        assert error_deg(result, results, name) == pytest.approx(expected, abs=0.25)
         assert error_deg(*told(), name) < 0.6

@@ -1,4 +1,4 @@
-"""Swings of each leg and bows: how far, which way, and what is still meanwhile."""
+"""Leg swings and bows: amplitude, direction, and still segments."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def part(kind: str) -> NDArray[np.intp]:
 
 
 def test_runs_follow_each_other_with_standing_between() -> None:
-    found = [(p.kind, p.start_s, p.end_s) for p in truth().phases]
-    assert found == [
+    result = [(p.kind, p.start_s, p.end_s) for p in truth().phases]
+    assert result == [
         ("stand", 0.0, 1.0),
         ("swing_left", 1.0, 5.0),
         ("stand", 5.0, 5.5),
@@ -48,30 +48,30 @@ def test_what_is_left_out_takes_no_time() -> None:
         (SwingsAndBows(swings=0, bows=1, bow_s=1.0, lead_s=0.5, rest_s=0.5), ["stand", "bow", "stand"]),
         (SwingsAndBows(swings=0, bows=0, lead_s=0.5), ["stand"]),
     ):
-        made = simulate_swings_and_bows(does)
-        assert [p.kind for p in made.truth.phases] == kinds
-        assert made.truth.t_s[-1] == pytest.approx(made.truth.phases[-1].end_s)
+        swings_and_bows = simulate_swings_and_bows(does)
+        assert [p.kind for p in swings_and_bows.truth.phases] == kinds
+        assert swings_and_bows.truth.t_s[-1] == pytest.approx(swings_and_bows.truth.phases[-1].end_s)
 
 
 def test_a_leg_swings_from_back_to_front_and_the_other_one_is_still() -> None:
-    for side, other in (("left", "right"), ("right", "left")):
-        here, angles = part(f"swing_{side}"), {n: np.degrees(a) for n, a in truth().angles.items()}
-        hip, knee = (angles[f"{name}_{side[0]}"][here] for name in ("hip_flexion", "knee_flexion"))
+    for side, second in (("left", "right"), ("right", "left")):
+        place, angles = part(f"swing_{side}"), {n: np.degrees(a) for n, a in truth().angles.items()}
+        hip, knee = (angles[f"{name}_{side[0]}"][place] for name in ("hip_flexion", "knee_flexion"))
         assert hip.max() == pytest.approx(35.0, abs=0.2)
         assert hip.min() == pytest.approx(-10.0, abs=0.2)
         assert knee == pytest.approx(6.0)
-        assert np.abs(angles[f"hip_adduction_{side[0]}"][here]).max() == pytest.approx(2.0, abs=0.5)
+        assert np.abs(angles[f"hip_adduction_{side[0]}"][place]).max() == pytest.approx(2.0, abs=0.5)
         for name in ("hip_flexion", "hip_adduction", "hip_rotation", "knee_flexion"):
-            assert angles[f"{name}_{other[0]}"][here] == pytest.approx(0.0, abs=1e-9), name
+            assert angles[f"{name}_{second[0]}"][place] == pytest.approx(0.0, abs=1e-9), name
 
 
 def test_a_bow_goes_forward_and_the_legs_stand() -> None:
-    here = part("bow")
-    ahead = rotate(truth().q["pelvis"][here], np.array([1.0, 0.0, 0.0]))
+    place = part("bow")
+    ahead = rotate(truth().q["pelvis"][place], np.array([1.0, 0.0, 0.0]))
     down = np.degrees(np.arcsin(-ahead[:, 2]))
     assert down.max() == pytest.approx(45.0, abs=0.5)
     assert down.min() > 0.0
-    assert np.ptp(truth().q["thigh_l"][here], axis=0).max() < 1e-12
+    assert np.ptp(truth().q["thigh_l"][place], axis=0).max() < 1e-12
     standing = truth().t_s < 1.0
     assert np.ptp(truth().q["pelvis"][standing], axis=0).max() < 1e-12
 

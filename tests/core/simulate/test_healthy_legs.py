@@ -1,8 +1,8 @@
-"""Where a simulated person is meant to be healthy, the truth is that of healthy adults at the same speed.
+"""Unaffected limbs of simulated people agree with healthy adults at the same speed.
 
-Means over the straight strides of every script, every step alike, against the norms at the speed walked
-(core/norms/at_speed.py). They are known to v* = 0.65; that the product compares nobody faster than
-comfortable with them does not matter here.
+Means over the straight strides of every script, steps alike, against the norms at the walked speed
+(core/norms/at_speed.py), valid to v* = 0.65; that the product uses them below comfortable speed only does not
+matter here.
 """
 
 from __future__ import annotations
@@ -100,14 +100,14 @@ def _measured(name: str) -> tuple[WalkingSpeed, Mapping[tuple[str, Side | None],
         events=GaitEvents(tuple(sorted(events, key=lambda e: e.time_s))),
         angles=JointAngles(truth.t_s, truth.angles, {}),
     )
-    found = {(p.name, p.side): p.mean for p in measure_gait(tracks).parameters if p.mean is not None}
-    return walking_speed(found["gait_speed_mps", None], REFERENCE_HEIGHT_M), found
+    result = {(p.name, p.side): p.mean for p in measure_gait(tracks).parameters if p.mean is not None}
+    return walking_speed(result["gait_speed_mps", None], REFERENCE_HEIGHT_M), result
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_unaffected_joints_move_as_those_of_healthy_adults(name: str) -> None:
-    speed, found = _measured(name)
+    speed, measurement = _measured(name)
     norms = angle_values_at_speed(None, speed.norm_speed)
     affected = AFFECTED.get(name, {})
     off = {
@@ -115,7 +115,7 @@ def test_unaffected_joints_move_as_those_of_healthy_adults(name: str) -> None:
         for side in SIDES
         for joint in JOINTS
         if joint not in affected.get(side, ())
-        for value, norm in ((found[joint, side], norms[joint]),)
+        for value, norm in ((measurement[joint, side], norms[joint]),)
         if abs(value - norm.mean) > MOST_SD * norm.sd
     }
     assert off == {}
@@ -123,27 +123,27 @@ def test_unaffected_joints_move_as_those_of_healthy_adults(name: str) -> None:
 
 @pytest.mark.parametrize("name", HEALTHY_PACE)
 def test_healthy_people_step_and_support_as_healthy_adults_do(name: str) -> None:
-    speed, found = _measured(name)
+    speed, measurement = _measured(name)
     norms = walkway_values_at_speed(speed.norm_speed, speed.norm_leg_m)
     off = {
-        (what, side): f"{value:.2f}, {(value - norms[what].mean) / norms[what].sd:+.1f} SD"
-        for (what, side), value in found.items()
-        if what in norms and abs(value - norms[what].mean) > MOST_SD * norms[what].sd
+        (label, side): f"{value:.2f}, {(value - norms[label].mean) / norms[label].sd:+.1f} SD"
+        for (label, side), value in measurement.items()
+        if label in norms and abs(value - norms[label].mean) > MOST_SD * norms[label].sd
     }
     assert off == {}
 
 
 @pytest.mark.parametrize("name", [name for name in AFFECTED if name in SCRIPTS])
 def test_what_is_called_affected_is(name: str) -> None:
-    """Each affected side differs from healthy adults somewhere: nobody is excused for nothing."""
-    speed, found = _measured(name)
+    """Each affected side differs from healthy adults somewhere: no exemption is unnecessary."""
+    speed, measurement = _measured(name)
     norms = angle_values_at_speed(None, speed.norm_speed)
     for side, joints in AFFECTED[name].items():
-        assert max(abs(found[j, side] - norms[j].mean) / norms[j].sd for j in joints) > MOST_SD
+        assert max(abs(measurement[j, side] - norms[j].mean) / norms[j].sd for j in joints) > MOST_SD
 
 
 def test_a_weak_push_off_does_not_bend_the_other_knee_at_contact() -> None:
     """The pelvis used to sink onto the stiff leg's low heel, and the healthy knee landed bent by 23°."""
-    _, found = _measured("stiff_knee")
-    assert found["knee_flexion_ic_deg", "right"] < 7.0
+    _, measurement = _measured("stiff_knee")
+    assert measurement["knee_flexion_ic_deg", "right"] < 7.0
     assert _truth("stiff_knee").guard_m < 0.008

@@ -1,4 +1,4 @@
-"""The named movements: each is simulated as what it is, and a name that is none is refused with all names."""
+"""Named movements are simulated as such; unknown names are refused with a list."""
 
 from __future__ import annotations
 
@@ -40,22 +40,22 @@ def test_titles_say_how_the_sensors_of_squats_sit() -> None:
 
 @pytest.mark.parametrize(("name", "agreed"), [("squats_agreed", True), ("squats", False)])
 def test_only_sensors_put_on_as_agreed_sit_where_the_analysis_takes_them(name: str, agreed: bool) -> None:
-    made = simulate_movement(name, 1, 1.7)
-    assert isinstance(made, SquatSimulation)
+    simulation = simulate_movement(name, 1, 1.7)
+    assert isinstance(simulation, SquatSimulation)
     for segment, place in place_as_agreed(1.7, ("right",)).items():
-        mount = made.truth.mounts[segment]
+        mount = simulation.truth.mounts[segment]
         turned = abs(float(mount.q_segment_sensor @ place.q_segment_sensor))
         assert (turned > 1.0 - 1e-9 and np.array_equal(mount.position_m, place.position_m)) is agreed
 
 
 def test_rises_of_the_day_are_of_a_chest_and_at_the_asked_rate() -> None:
-    made = simulate_movement("chair_rises", 1, rate_hz=50.0)
-    assert isinstance(made, ChestSimulation)
-    assert {s.rate_hz for s in made.recording.streams.values()} == {50.0}
+    simulation = simulate_movement("chair_rises", 1, rate_hz=50.0)
+    assert isinstance(simulation, ChestSimulation)
+    assert {s.rate_hz for s in simulation.recording.streams.values()} == {50.0}
     assert sum(h.posture == "sit" for h in MOVEMENTS["chair_rises"].does) == 6  # type: ignore[union-attr]
 
 
 def test_five_rises_are_not_a_walk_there_and_back() -> None:
-    made = simulate_movement("five_sit_to_stand", 1, rate_hz=50.0)
-    assert isinstance(made, ChairSimulation)
-    assert made.recording.protocol == "five_sit_to_stand"
+    simulation = simulate_movement("five_sit_to_stand", 1, rate_hz=50.0)
+    assert isinstance(simulation, ChairSimulation)
+    assert simulation.recording.protocol == "five_sit_to_stand"

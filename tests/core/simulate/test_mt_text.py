@@ -23,10 +23,10 @@ def test_files_read_back_as_the_recording(lossy: Simulation) -> None:
     back = finish([xsens.read(data, name) for name, data in files.items()])
     assert set(back) == set(lossy.recording.streams)
     for device, stream in lossy.recording.streams.items():
-        again = back[device]
-        assert again.rate_hz == 60.0
-        assert again.t_s == pytest.approx(stream.t_s, abs=1e-9), "counter wraps and gaps keep their time"
-        for a, b in ((again.acc, stream.acc), (again.gyr, stream.gyr), (again.mag, stream.mag)):
+        second = back[device]
+        assert second.rate_hz == 60.0
+        assert second.t_s == pytest.approx(stream.t_s, abs=1e-9), "counter wraps and gaps keep their time"
+        for a, b in ((second.acc, stream.acc), (second.gyr, stream.gyr), (second.mag, stream.mag)):
             assert a is not None
             assert b is not None
             assert np.abs(a - b).max() <= 0.5e-6 + 1e-12

@@ -121,13 +121,13 @@ def walked(name: str, seed: int, rising: bool = True) -> WalkTruth:
 @cache
 def recorded(name: str, seed: int = 5) -> tuple[Simulation, Orientations]:
     """The named walk as sensors see it, shocks included, and the orientations an analysis makes of it."""
-    made = simulate_scenario(name, seed)
-    return made, estimate_orientations(calibration.calibrate(synchronise(made.recording)))
+    simulation = simulate_scenario(name, seed)
+    return simulation, estimate_orientations(calibration.calibrate(synchronise(simulation.recording)))
 
 
 @cache
 def contacts(name: str, seed: int, threshold: float = -0.2, rising: bool = True) -> GaitEvents:
-    """What the foot-pitch rule finds on the true orientations."""
+    """Contacts detected by the foot-pitch rule on true orientations."""
     truth = walked(name, seed, rising)
     valid = {s: np.ones(len(truth.t_s), np.bool_) for s in truth.q}
     exact = Orientations(truth.t_s, truth.rate_hz, truth.q, valid, "truth")
@@ -144,8 +144,8 @@ def test_every_person_has_a_signature_and_a_script() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_the_signature_shows(name: str, seed: int) -> None:
     truth = walked(name, seed)
-    seen = SIGNATURES[name](features(truth, "right"), features(truth, "left"))
-    assert [what for what, shows in seen.items() if not shows] == []
+    observations = SIGNATURES[name](features(truth, "right"), features(truth, "left"))
+    assert [label for label, shows in observations.items() if not shows] == []
 
 
 @pytest.mark.parametrize("name", SIGNATURES)
@@ -203,10 +203,10 @@ def test_the_rule_invents_nothing_and_finds_all_heel_contacts(name: str, rising:
 @pytest.mark.parametrize("name", [n for n in SIGNATURES if n != "severe_shuffle"])
 def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str) -> None:
     """What an analysis sees: half a degree of error must not move the maximum of the pitch by 0.1 s."""
-    made, orientations = recorded(name)
-    found = events.detect(orientations)
+    recording, orientations = recorded(name)
+    detections = events.detect(orientations)
     for side in SIDES:
-        ic = match(found.times(side, "ic"), made.truth.contacts[side].contact.tolist())
+        ic = match(detections.times(side, "ic"), recording.truth.contacts[side].contact.tolist())
         assert len(ic.extra) + ic.missed <= 1
         assert abs(float(np.median(ic.errors))) < 0.040
 
@@ -214,11 +214,11 @@ def test_contacts_stay_in_place_on_estimated_orientations_with_shocks(name: str)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_severe_shuffle_is_refused_with_its_figure(seed: int) -> None:
-    found = contacts("severe_shuffle", seed)
-    assert found.events == ()
-    notices = [n for n in found.notices if n.code == "no_toe_off"]
+    result = contacts("severe_shuffle", seed)
+    assert result.events == ()
+    notices = [n for n in result.notices if n.code == "no_toe_off"]
     assert len(notices) == 2
-    for figures in found.diagnostics.values():
+    for figures in result.diagnostics.values():
         assert -0.15 < figures.s_min < -0.09  # type: ignore[attr-defined]
 
 
@@ -230,14 +230,14 @@ def test_a_landing_on_the_forefoot_has_no_largest_pitch_at_contact() -> None:
     contact, not from the pitch.
     """
     truth = walked("drop_foot", 5)
-    found = contacts("drop_foot", 5)
+    result = contacts("drop_foot", 5)
     pitch = pitch_signal(truth.q["foot_l"])
     for contact, flat in zip(truth.contacts["left"].contact, truth.contacts["left"].flat, strict=True):
         first, last = np.searchsorted(truth.t_s, (contact, flat))
         assert pitch[first] < 0.0
         assert (np.diff(pitch[first:last]) > 0.0).all()
-    assert found.times("left", "ic") == ()
-    assert len(found.times("right", "ic")) == len(truth.contacts["right"].contact)
+    assert result.times("left", "ic") == ()
+    assert len(result.times("right", "ic")) == len(truth.contacts["right"].contact)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -246,14 +246,14 @@ def test_a_lower_threshold_loses_the_contacts_of_a_drop_foot(seed: int) -> None:
     """The forefoot touches down at s of about −0.13, below −0.1
     (docs/science/simulation.md, "Virtual people").
 
-    What the rule finds instead is the still foot 0.1 to 0.4 s later: lost is what is not there within 60 ms.
+    The rule then finds the still foot 0.1 to 0.4 s later; contacts without a detection within 60 ms are lost.
     """
-    made, orientations = recorded("drop_foot", seed)
+    recording, orientations = recorded("drop_foot", seed)
     lost = {}
     for threshold in (-0.2, -0.1):
-        found = events.detect(orientations, FootPitchParams(threshold=threshold))
+        detections = events.detect(orientations, FootPitchParams(threshold=threshold))
         for side in SIDES:
-            ic = match(found.times(side, "ic"), made.truth.contacts[side].contact.tolist())
+            ic = match(detections.times(side, "ic"), recording.truth.contacts[side].contact.tolist())
             lost[side, threshold] = ic.missed + int(np.sum(np.abs(ic.errors) > 0.06))
     assert lost["left", -0.2] <= 3
     assert lost["left", -0.1] >= 10

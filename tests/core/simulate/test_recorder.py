@@ -25,8 +25,8 @@ class Sent:
     gyr: Floats
 
 
-def _stream(made: Simulation, segment: Segment) -> Sent:
-    stream = made.recording.streams[next(d for d, s in made.recording.segments.items() if s == segment)]
+def _stream(result: Simulation, segment: Segment) -> Sent:
+    stream = result.recording.streams[next(d for d, s in result.recording.segments.items() if s == segment)]
     assert stream.gyr is not None
     return Sent(stream.t_s, stream.acc, stream.gyr)
 
@@ -36,8 +36,10 @@ def _lag_s(early: Floats, late: Floats, rate_hz: float) -> float:
     early, late = early - early.mean(), late - late.mean()
     match = np.correlate(late, early, "full")
     k = int(np.argmax(match))
-    before, at, after = match[k - 1 : k + 2]
-    return float((k - len(early) + 1 + 0.5 * (before - after) / (before - 2.0 * at + after)) / rate_hz)
+    initial, position, final = match[k - 1 : k + 2]
+    return float(
+        (k - len(early) + 1 + 0.5 * (initial - final) / (initial - 2.0 * position + final)) / rate_hz
+    )
 
 
 @pytest.mark.slow
@@ -72,8 +74,8 @@ def test_a_lag_survives_the_common_time_axis() -> None:
 
 
 def test_readings_beyond_the_range_are_cut_and_marked() -> None:
-    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(acc_range=30.0, gyr_range=4.0))
-    stream, clipped = _stream(made, "foot_l"), made.clipped["foot_l"]
+    simulation = simulate(SCRIPT, seed=4, setup=RecordingSetup(acc_range=30.0, gyr_range=4.0))
+    stream, clipped = _stream(simulation, "foot_l"), simulation.clipped["foot_l"]
     assert np.abs(stream.acc).max() == 30.0
     assert np.abs(stream.gyr).max() == 4.0
     at_limit = (np.abs(stream.acc) == 30.0).any(axis=1) | (np.abs(stream.gyr) == 4.0).any(axis=1)
@@ -82,9 +84,9 @@ def test_readings_beyond_the_range_are_cut_and_marked() -> None:
 
 
 def test_a_quiet_walk_stays_in_the_range_of_a_real_sensor() -> None:
-    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(impacts=True))
-    assert not made.clipped["shank_r"].any()
-    assert not made.clipped["pelvis"].any()
+    simulation = simulate(SCRIPT, seed=4, setup=RecordingSetup(impacts=True))
+    assert not simulation.clipped["shank_r"].any()
+    assert not simulation.clipped["pelvis"].any()
 
 
 def test_sensors_not_worn_have_no_stream_and_leave_the_others_as_they_are() -> None:
@@ -97,8 +99,10 @@ def test_sensors_not_worn_have_no_stream_and_leave_the_others_as_they_are() -> N
 
 
 def test_a_sensor_that_fails_halfway_is_known_as_lost() -> None:
-    made = simulate(SCRIPT, seed=4, setup=RecordingSetup(dropouts=(Dropout("shank_l", 4.0, float("inf")),)))
-    valid = synchronise(made.recording).sensors["shank_l"].valid
+    simulation = simulate(
+        SCRIPT, seed=4, setup=RecordingSetup(dropouts=(Dropout("shank_l", 4.0, float("inf")),))
+    )
+    valid = synchronise(simulation.recording).sensors["shank_l"].valid
     t = np.arange(len(valid)) / 100.0
     assert valid[t < 3.9].all()
     assert not valid[t > 4.1].any()

@@ -70,11 +70,11 @@ def test_the_orientation_of_a_sensor_is_that_of_its_bone_and_with_skin_what_its_
 
 
 def test_sensors_at_rest_read_gravity_upwards_and_no_rate(mixed: Simulation) -> None:
-    rest = mixed.truth.t_s < 2.0
+    remainder = mixed.truth.t_s < 2.0
     for segment, signals in mixed.ideal.items():
-        up = rotate(_sensor_orientation(mixed, segment)[rest], signals.acc[rest])
+        up = rotate(_sensor_orientation(mixed, segment)[remainder], signals.acc[remainder])
         assert np.allclose(up, [0.0, 0.0, GRAVITY], atol=1e-7)
-        assert np.abs(signals.gyr[rest]).max() < 1e-8
+        assert np.abs(signals.gyr[remainder]).max() < 1e-8
 
 
 def test_a_flat_foot_reads_gravity_and_no_rate(mixed: Simulation) -> None:
@@ -125,8 +125,8 @@ def test_instant_signals_are_derivatives_of_the_truth() -> None:
     dt = 1.0 / fine.truth.rate_hz
     q = _sensor_orientation(fine, "thigh_l")
     gyr = fine.ideal["thigh_l"].gyr
-    between = multiply(conjugate(q[:-2]), q[2:])
-    central = 2.0 * between[:, 1:] * np.sign(between[:, :1]) / (2.0 * dt)
+    gap = multiply(conjugate(q[:-2]), q[2:])
+    central = 2.0 * gap[:, 1:] * np.sign(gap[:, :1]) / (2.0 * dt)
     assert np.sqrt(np.mean((central - gyr[1:-1]) ** 2)) < 0.005 * np.sqrt(np.mean(gyr**2))
 
 

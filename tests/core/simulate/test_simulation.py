@@ -21,14 +21,14 @@ def made(seed: int = 1, setup: RecordingSetup | None = None) -> Simulation:
 
 
 def test_the_same_arguments_give_the_same_bits_and_another_seed_does_not() -> None:
-    one, again, other = made(), made(), made(2)
+    one, second, alternative = made(), made(), made(2)
     for device, stream in one.recording.streams.items():
-        same = again.recording.streams[device]
+        same = second.recording.streams[device]
         assert np.array_equal(stream.acc, same.acc)
         assert stream.digest == same.digest
-    assert set(one.recording.segments.values()) == set(other.recording.segments.values())
+    assert set(one.recording.segments.values()) == set(alternative.recording.segments.values())
     assert len(one.recording.segments) == 7
-    assert not set(one.recording.streams) & set(other.recording.streams)
+    assert not set(one.recording.streams) & set(alternative.recording.streams)
     assert one.truth.seed == 1
 
 
@@ -41,19 +41,19 @@ def test_less_noise_leaves_the_steps_and_mountings_alone() -> None:
 
 
 def test_truth_and_recording_have_the_same_samples() -> None:
-    found = made(setup=replace(RecordingSetup(), rate_hz=50.0))
-    assert found.truth.rate_hz == 50.0
-    (n,) = {len(s.t_s) for s in found.recording.streams.values()}
-    assert n == len(found.truth.t_s)
-    assert found.truth.t_s[1] == pytest.approx(0.02)
-    assert found.recording.subject.height_m == Walker().height_m
+    result = made(setup=replace(RecordingSetup(), rate_hz=50.0))
+    assert result.truth.rate_hz == 50.0
+    (n,) = {len(s.t_s) for s in result.recording.streams.values()}
+    assert n == len(result.truth.t_s)
+    assert result.truth.t_s[1] == pytest.approx(0.02)
+    assert result.recording.subject.height_m == Walker().height_m
 
 
 def test_peaks_are_of_the_ideal_signals_and_feet_have_the_largest() -> None:
-    found = made()
-    peaks = found.peaks()
+    result = made()
+    peaks = result.peaks()
     for segment, (force, rate) in peaks.items():
-        ideal = found.ideal[segment]
+        ideal = result.ideal[segment]
         assert force == np.linalg.norm(ideal.acc, axis=1).max() > GRAVITY
         assert rate == np.linalg.norm(ideal.gyr, axis=1).max()
     assert max(peaks, key=lambda s: peaks[s][1]).startswith("foot")

@@ -75,8 +75,8 @@ def test_phases_follow_the_knee_without_gaps(squats: SquatSimulation) -> None:
     truth = squats.truth
     assert truth.phases[0].start_s == 0.0
     assert truth.phases[-1].end_s == pytest.approx(truth.t_s[-1])
-    for before, after in zip(truth.phases[:-1], truth.phases[1:], strict=True):
-        assert before.end_s == after.start_s
+    for initial, final in zip(truth.phases[:-1], truth.phases[1:], strict=True):
+        assert initial.end_s == final.start_s
     assert [p.kind for p in truth.phases] == ["stand", "down", "hold", "up"] * 5 + ["stand"]
     knee = truth.angles["knee_flexion_r"]
     for phase in truth.phases:
@@ -95,8 +95,8 @@ def test_depths_vary_and_are_those_drawn(seed: int) -> None:
     knee = truth.angles["knee_flexion_r"]
     bottoms = [p for p in truth.phases if p.kind == "hold"]
     for depth, bottom in zip(truth.depths_rad, bottoms, strict=True):
-        at = np.searchsorted(truth.t_s, 0.5 * (bottom.start_s + bottom.end_s))
-        assert knee[at] == pytest.approx(np.radians(5.0) + depth, abs=1e-9)
+        index = np.searchsorted(truth.t_s, 0.5 * (bottom.start_s + bottom.end_s))
+        assert knee[index] == pytest.approx(np.radians(5.0) + depth, abs=1e-9)
         assert abs(depth / np.radians(70.0) - 1.0) <= 0.12 + 1e-12
 
 
@@ -109,20 +109,20 @@ def test_the_left_leg_is_the_mirror_image(squats: SquatSimulation) -> None:
 
 
 def test_its_recording_is_one_of_squats_with_skin_and_noise() -> None:
-    made = simulate_squats(seed=3, setup=RecordingSetup(tissue=SoftTissue()))
-    assert made.recording.protocol == "squat"
-    assert set(made.recording.segments.values()) == set(CHAIN)
+    result = simulate_squats(seed=3, setup=RecordingSetup(tissue=SoftTissue()))
+    assert result.recording.protocol == "squat"
+    assert set(result.recording.segments.values()) == set(CHAIN)
     bone = simulate_squats(seed=3, setup=RecordingSetup())
     for segment in CHAIN:
-        same = np.array_equal(made.ideal[segment].gyr, bone.ideal[segment].gyr)
+        same = np.array_equal(result.ideal[segment].gyr, bone.ideal[segment].gyr)
         assert same == (segment in ("pelvis", "foot_r"))
-        assert np.array_equal(made.truth.q[segment], bone.truth.q[segment])
+        assert np.array_equal(result.truth.q[segment], bone.truth.q[segment])
 
 
 def test_the_same_seed_gives_the_same_bits() -> None:
-    a, b, other = (simulate_squats(seed=seed).recording for seed in (4, 4, 5))
+    a, b, second = (simulate_squats(seed=seed).recording for seed in (4, 4, 5))
     assert [s.digest for s in a.streams.values()] == [s.digest for s in b.streams.values()]
-    assert [s.digest for s in a.streams.values()] != [s.digest for s in other.streams.values()]
+    assert [s.digest for s in a.streams.values()] != [s.digest for s in second.streams.values()]
 
 
 @pytest.mark.parametrize(

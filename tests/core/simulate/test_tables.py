@@ -28,10 +28,10 @@ def test_every_contact_has_a_row_and_every_foot_off_two() -> None:
     rows = list(zip(table["time_s"], table["side"], table["kind"], table["source"], strict=True))
     expected = []
     for side in SIDES:
-        found = TRUTH.contacts[side]
-        expected += [(t, side, "ic", "truth") for t in found.contact.tolist()]
-        expected += [(t, side, "tc", "truth_release") for t in found.release.tolist()]
-        expected += [(t, side, "tc", "truth_lift5") for t in found.lift5.tolist()]
+        contacts = TRUTH.contacts[side]
+        expected += [(t, side, "ic", "truth") for t in contacts.contact.tolist()]
+        expected += [(t, side, "tc", "truth_release") for t in contacts.release.tolist()]
+        expected += [(t, side, "tc", "truth_lift5") for t in contacts.lift5.tolist()]
     assert rows == sorted(expected)
     assert len(rows) == 3 * len(TRUTH.footprints["left"][1:] + TRUTH.footprints["right"][1:])
 

@@ -32,12 +32,12 @@ RATE = 100.0
 
 @cache
 def squatted(side: Side) -> tuple[SquatSimulation, CalibratedRecording, LegMotion, JointAngles]:
-    made = squat_on(side, RATE, MEMS, repetitions=5)
+    simulation = squat_on(side, RATE, MEMS, repetitions=5)
     calibrated = calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts(side), "fixed_offset", FIXED_OFFSET
+        synchronise(simulation.recording), make_fixed_mounts(side), "fixed_offset", FIXED_OFFSET
     )
     leg = estimate_leg(calibrated, measure_leg(HEIGHT_M, side))
-    return made, calibrated, leg, measure_angles(leg.orientations, calibrated.calibration.zero)
+    return simulation, calibrated, leg, measure_angles(leg.orientations, calibrated.calibration.zero)
 
 
 @cache
@@ -48,31 +48,33 @@ def measured(side: Side) -> SquatSide:
 
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_repetitions_and_measures_are_the_true_ones(side: Side) -> None:
-    made, found = squatted(side)[0], measured(side)
-    truth, end = made.truth, side[0]
-    assert [r.excluded for r in found.repetitions] == [None] * 5
+    result, measurement = squatted(side)[0], measured(side)
+    truth, end = result.truth, side[0]
+    assert [r.excluded for r in measurement.repetitions] == [None] * 5
     holds = [p for p in truth.phases if p.kind == "hold"]
     downs = [p for p in truth.phases if p.kind == "down"]
     ups = [p for p in truth.phases if p.kind == "up"]
-    for r, down, hold, up in zip(found.repetitions, downs, holds, ups, strict=True):
+    for r, down, hold, up in zip(measurement.repetitions, downs, holds, ups, strict=True):
         assert down.start_s < r.start_s < down.start_s + 0.5
         assert hold.start_s - 0.1 <= r.bottom_s <= hold.end_s + 0.1
         assert up.end_s - 0.5 < r.end_s < up.end_s
-    assert found.values["squat_depth_deg"] == pytest.approx(
-        np.degrees(_at_holds(made, f"knee_flexion_{end}")), abs=1.0
+    assert measurement.values["squat_depth_deg"] == pytest.approx(
+        np.degrees(_at_holds(result, f"knee_flexion_{end}")), abs=1.0
     )
-    inward = _at_holds(made, f"hip_adduction_{end}") + _at_holds(made, f"hip_rotation_{end}")
-    assert found.values["squat_knee_valgus_bottom_deg"] == pytest.approx(np.degrees(inward), abs=2.5)
+    inward = _at_holds(result, f"hip_adduction_{end}") + _at_holds(result, f"hip_rotation_{end}")
+    assert measurement.values["squat_knee_valgus_bottom_deg"] == pytest.approx(np.degrees(inward), abs=2.5)
     thigh = truth.p[f"thigh_{end}"][:, 2]  # type: ignore[index]
     drops = [thigh[0] - np.interp(0.5 * (p.start_s + p.end_s), truth.t_s, thigh) for p in holds]
-    assert found.values["squat_hip_drop_m"] == pytest.approx(drops, abs=0.015)
-    assert (found.values["squat_knee_valgus_deg"] >= found.values["squat_knee_valgus_bottom_deg"]).all()
-    total = found.values["squat_descent_s"] + found.values["squat_ascent_s"]
-    assert found.values["squat_duration_s"] == pytest.approx(total)
+    assert measurement.values["squat_hip_drop_m"] == pytest.approx(drops, abs=0.015)
+    assert (
+        measurement.values["squat_knee_valgus_deg"] >= measurement.values["squat_knee_valgus_bottom_deg"]
+    ).all()
+    total = measurement.values["squat_descent_s"] + measurement.values["squat_ascent_s"]
+    assert measurement.values["squat_duration_s"] == pytest.approx(total)
 
 
-def _at_holds(made: SquatSimulation, name: str) -> Floats:
-    truth = made.truth
+def _at_holds(result: SquatSimulation, name: str) -> Floats:
+    truth = result.truth
     middles = [0.5 * (p.start_s + p.end_s) for p in truth.phases if p.kind == "hold"]
     return np.interp(middles, truth.t_s, truth.subtract_standing()[name])
 
@@ -88,22 +90,22 @@ def test_curves_of_every_repetition() -> None:
 
 
 def test_two_legs_are_compared_like_all_parameters() -> None:
-    both = (*measured("left").parameters, *measured("right").parameters)
-    compared = {s.name: s for s in compare_sides(both)}
+    pair = (*measured("left").parameters, *measured("right").parameters)
+    compared = {s.name: s for s in compare_sides(pair)}
     assert set(compared) == set(MEASURES)
     assert abs(compared["squat_depth_deg"].difference) < 1.0
     assert compared["squat_depth_deg"].reason == "angle"
     assert compared["squat_duration_s"].index_pct == pytest.approx(0.0, abs=5.0)
-    assert all(p.n == 5 and p.mean is not None and p.sd is not None for p in both)
+    assert all(p.n == 5 and p.mean is not None and p.sd is not None for p in pair)
 
 
 def test_without_a_leg_or_a_squat_there_is_a_reason() -> None:
     _, _, leg, angles = squatted("right")
-    other = measure_squats(angles, leg, "left")
-    assert {p.reason for p in other.parameters} == {"no_angles"}
+    other_squats = measure_squats(angles, leg, "left")
+    assert {p.reason for p in other_squats.parameters} == {"no_angles"}
     still = replace(angles, angles={name: np.zeros_like(a) for name, a in angles.angles.items()})
     assert {p.reason for p in measure_squats(still, leg, "right").parameters} == {"no_repetitions"}
-    assert all(p.mean is None and p.n == 0 for p in other.parameters)
+    assert all(p.mean is None and p.n == 0 for p in other_squats.parameters)
 
 
 def course(*depths_deg: float, cycle_s: float = 4.0) -> tuple[Floats, Floats]:
@@ -115,9 +117,9 @@ def course(*depths_deg: float, cycle_s: float = 4.0) -> tuple[Floats, Floats]:
 
 def test_continuous_squats_are_told_apart_and_small_bends_are_none() -> None:
     knee, t = course(70.0, 60.0, 12.0, 80.0)
-    found = find_repetitions(knee, t, "right")
-    assert [round(r.bottom_s) for r in found] == [2, 6, 14]
-    assert [round(float(np.degrees(knee[r.bottom]))) for r in found] == [70, 60, 80]
+    repetitions = find_repetitions(knee, t, "right")
+    assert [round(r.bottom_s) for r in repetitions] == [2, 6, 14]
+    assert [round(float(np.degrees(knee[r.bottom]))) for r in repetitions] == [70, 60, 80]
 
 
 def test_a_bounce_at_the_bottom_is_one_squat() -> None:
@@ -131,8 +133,8 @@ def test_a_bounce_at_the_bottom_is_one_squat() -> None:
 def test_what_the_take_cuts_is_incomplete() -> None:
     knee, t = course(70.0, 70.0, 70.0)
     part = slice(200, 1000)
-    found = find_repetitions(knee[part], t[part], "left")
-    assert [r.excluded for r in found] == ["incomplete", None, "incomplete"]
+    repetitions = find_repetitions(knee[part], t[part], "left")
+    assert [r.excluded for r in repetitions] == ["incomplete", None, "incomplete"]
 
 
 def test_a_silence_and_a_moving_foot_exclude() -> None:
@@ -153,8 +155,8 @@ def test_a_silence_and_a_moving_foot_exclude() -> None:
 def test_a_bend_of_a_lifted_leg_is_no_squat_of_it() -> None:
     knee, t = course(70.0, 70.0, 70.0)
     stands = (t < 4.2) | (t > 7.8)
-    found = find_repetitions(knee, t, "right", stands=stands)
-    assert [r.excluded for r in found] == [None, "foot_lifted", None]
+    repetitions = find_repetitions(knee, t, "right", stands=stands)
+    assert [r.excluded for r in repetitions] == [None, "foot_lifted", None]
     _, _, leg, angles = squatted("right")
     hanging = replace(leg, stands=np.zeros(len(angles.t_s), bool))
     side = measure_squats(angles, hanging, "right")

@@ -38,12 +38,12 @@ from tests.core.body.chain.squats import HEIGHT_M, squat_on
 @cache
 def case() -> SquatCase:
     """Two squats with noise, every sensor exactly as agreed."""
-    made = squat_on("right", 50.0, RecordingSetup().noise, repetitions=2)
+    simulation = squat_on("right", 50.0, RecordingSetup().noise, repetitions=2)
     calibrated = calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
+        synchronise(simulation.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
     )
     leg = measure_leg(HEIGHT_M, "right")
-    truth = ReferenceAngles(made.truth.t_s, made.truth.angles)
+    truth = ReferenceAngles(simulation.truth.t_s, simulation.truth.angles)
     return make_case(calibrated, leg, truth, from_standing=False)
 
 
@@ -95,15 +95,17 @@ def test_a_change_is_that_of_equation_1() -> None:
     turn = 0.05 * radians(45.0)
     mount = case().mounts["shank_r"]
     errors = []
-    for by in (turn, -turn):
-        off = replace(case(), mounts={**case().mounts, "shank_r": to_matrix(about(1, by)) @ mount})
+    for by_key in (turn, -turn):
+        off = replace(case(), mounts={**case().mounts, "shank_r": to_matrix(about(1, by_key)) @ mount})
         errors.append(analyse_errors(off))
     change = np.mean(np.abs(np.array(errors) - table().errors), axis=0)
     assert row.relative_rad == pytest.approx(change)
-    known = table().errors > radians(0.1)
+    reference = table().errors > radians(0.1)
     assert row.sensitivity_pct is not None
-    assert row.sensitivity_pct[known] == pytest.approx(100.0 * change[known] / table().errors[known] / 0.05)
-    assert np.isnan(row.sensitivity_pct[~known]).all()
+    assert row.sensitivity_pct[reference] == pytest.approx(
+        100.0 * change[reference] / table().errors[reference] / 0.05
+    )
+    assert np.isnan(row.sensitivity_pct[~reference]).all()
 
 
 def analyse_errors(off: SquatCase) -> np.ndarray:
@@ -122,9 +124,9 @@ def test_from_standing_a_turned_sensor_costs_little() -> None:
 
 
 def test_joint_angles_are_those_of_the_orientations() -> None:
-    made = squat_on("left", 50.0, repetitions=1)
+    simulation = squat_on("left", 50.0, repetitions=1)
     calibrated = calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts("left"), "fixed_offset", FIXED_OFFSET
+        synchronise(simulation.recording), make_fixed_mounts("left"), "fixed_offset", FIXED_OFFSET
     )
     leg = estimate_leg(calibrated, measure_leg(HEIGHT_M, "left"))
     named = name_joint_angles(leg.motion.angles, "left")
@@ -141,11 +143,11 @@ def test_averages_leave_out_what_is_not_defined() -> None:
 
 
 def test_a_reference_that_does_not_fit_is_refused() -> None:
-    made = squat_on("right", 50.0, repetitions=1)
+    simulation = squat_on("right", 50.0, repetitions=1)
     calibrated = calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
+        synchronise(simulation.recording), make_fixed_mounts("right"), "fixed_offset", FIXED_OFFSET
     )
-    leg, truth = measure_leg(HEIGHT_M, "right"), made.truth
+    leg, truth = measure_leg(HEIGHT_M, "right"), simulation.truth
     with pytest.raises(EstimationError) as caught:
         make_case(
             calibrated, leg, ReferenceAngles(truth.t_s, {"knee_flexion_r": truth.t_s}), from_standing=False
@@ -162,21 +164,23 @@ def test_a_reference_that_does_not_fit_is_refused() -> None:
 def both_legs() -> CalibratedRecording:
     squats = Squats(repetitions=1, other="lifted", hinged=True)
     setup = RecordingSetup(rate_hz=50.0, noise=MEMS)
-    made = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, SIDES))
+    result = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, SIDES))
     return calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts(*SIDES), "fixed_offset", FIXED_OFFSET
+        synchronise(result.recording), make_fixed_mounts(*SIDES), "fixed_offset", FIXED_OFFSET
     )
 
 
 @pytest.mark.sweep
 def test_without_a_reference_errors_are_changes_of_the_legs_own_angles() -> None:
     legs = [measure_leg(HEIGHT_M, side) for side in SIDES]
-    told: list[float] = []
-    found = analyse_legs(both_legs(), legs, from_standing=False, progress=lambda _, share: told.append(share))
-    assert set(found) == {"left", "right"}
-    assert told == sorted(told)
-    assert len(told) == 48
-    for leg in found.values():
+    values: list[float] = []
+    result = analyse_legs(
+        both_legs(), legs, from_standing=False, progress=lambda _, share: values.append(share)
+    )
+    assert set(result) == {"left", "right"}
+    assert values == sorted(values)
+    assert len(values) == 48
+    for leg in result.values():
         rows = {row.name: row for row in leg.rows}
         assert not leg.errors.any()
         assert np.degrees(rows["Yaw-thi"].absolute_rad[3]) == pytest.approx(2.0, abs=0.3)

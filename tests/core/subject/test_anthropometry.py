@@ -1,4 +1,4 @@
-"""Lengths of the body: what a tape gave is taken, what it did not is estimated and marked so."""
+"""Body lengths: measured ones are used, others estimated and marked."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def test_hips_lie_where_harrington_puts_them() -> None:
 
 
 def test_the_manifest_has_them_and_keeps_them() -> None:
-    who = manifest_of({"subject": {"height_m": 1.7, "measures": {"leg_m": 0.9}}}).subject
-    assert who.measures == BodyMeasures(leg_m=0.9)
-    assert who.to_json()["measures"] == {"leg_m": 0.9}
-    other = manifest_of({"subject": {"measures": {"leg_m": 0.8, "foot_m": 0.25}}}).subject
-    assert who.complete_from(other).measures == BodyMeasures(leg_m=0.9, foot_m=0.25)
+    subject = manifest_of({"subject": {"height_m": 1.7, "measures": {"leg_m": 0.9}}}).subject
+    assert subject.measures == BodyMeasures(leg_m=0.9)
+    assert subject.to_json()["measures"] == {"leg_m": 0.9}
+    other_subject = manifest_of({"subject": {"measures": {"leg_m": 0.8, "foot_m": 0.25}}}).subject
+    assert subject.complete_from(other_subject).measures == BodyMeasures(leg_m=0.9, foot_m=0.25)
 
 
 @pytest.mark.parametrize("measures", [{"leg_m": 90}, {"leg": 0.9}])

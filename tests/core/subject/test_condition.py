@@ -1,4 +1,4 @@
-"""Only walks under the same condition tell how a person changed."""
+"""Only walks under the same condition are compared."""
 
 from __future__ import annotations
 
@@ -48,19 +48,19 @@ def test_every_value_has_words_and_no_other() -> None:
 
 @pytest.mark.parametrize("changed", OTHERWISE)
 def test_a_walk_in_another_condition_is_not_compared(changed: dict[str, Any]) -> None:
-    other = replace(USUAL, **changed)
-    assert not is_comparable(USUAL, other)
-    assert not is_comparable(other, USUAL)
-    assert is_comparable(other, other)
-    assert len(compare_conditions(USUAL, other)) == 1
+    other_variant = replace(USUAL, **changed)
+    assert not is_comparable(USUAL, other_variant)
+    assert not is_comparable(other_variant, USUAL)
+    assert is_comparable(other_variant, other_variant)
+    assert len(compare_conditions(USUAL, other_variant)) == 1
 
 
 def test_a_walk_with_feedback_is_compared_with_nothing_though_walked_alike() -> None:
-    told = replace(USUAL, feedback=True)
-    assert is_alike(USUAL, told)
-    assert not is_comparable(USUAL, told)
-    assert not is_comparable(told, told)
-    assert compare_conditions(USUAL, told) == ("without feedback, then with",)
+    variant = replace(USUAL, feedback=True)
+    assert is_alike(USUAL, variant)
+    assert not is_comparable(USUAL, variant)
+    assert not is_comparable(variant, variant)
+    assert compare_conditions(USUAL, variant) == ("without feedback, then with",)
 
 
 def test_what_nobody_stated_is_like_nothing_but_itself() -> None:

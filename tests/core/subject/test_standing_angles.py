@@ -1,4 +1,4 @@
-"""Goniometer angles of standing: what may be entered."""
+"""Goniometer angles of standing: accepted input."""
 
 from __future__ import annotations
 

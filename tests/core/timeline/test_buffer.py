@@ -59,19 +59,19 @@ def test_the_axis_is_known_up_to_the_last_good_sample_of_every_live_stream() -> 
     buffer = make(1, 1)
     push(buffer, 0, np.arange(10))
     push(buffer, 1, np.arange(5), offset_us=20_000)
-    both = np.array([True, True])
+    joint_values = np.array([True, True])
     assert buffer.last_s.tolist() == [0.09, 0.06]
-    assert buffer.until(both) == 0.06
+    assert buffer.until(joint_values) == 0.06
     assert buffer.until(np.array([True, False])) == 0.09
     assert buffer.until(np.array([False, False])) == np.inf
 
 
 def test_a_hole_too_long_to_be_filled_is_waited_for_no_longer() -> None:
     """Eleven lost ones are waited for: the next may come right after them, a tenth of a second too late."""
-    for lost, known in ((11, 0.02), (12, 0.14)):
+    for lost, reference in ((11, 0.02), (12, 0.14)):
         buffer = make(1)
         push(buffer, 0, np.arange(3 + lost), lost=tuple(range(3, 3 + lost)))
-        assert buffer.until(np.array([True])) == pytest.approx(known)
+        assert buffer.until(np.array([True])) == pytest.approx(reference)
 
 
 def test_what_is_laid_in_parts_is_what_is_laid_at_once_and_rows_grow_as_needed() -> None:
@@ -80,6 +80,6 @@ def test_what_is_laid_in_parts_is_what_is_laid_at_once_and_rows_grow_as_needed()
     for first in range(0, 300, 60):
         push(parts, 0, np.arange(first, first + 60), lost=(40, 41, 150))
     expected = whole.lay(0, 300, 0.0)
-    found = [parts.lay(first, first + 100, 0.0) for first in (0, 100, 200)]
-    for ours, theirs in zip(zip(*found, strict=True), expected, strict=True):
+    result = [parts.lay(first, first + 100, 0.0) for first in (0, 100, 200)]
+    for ours, theirs in zip(zip(*result, strict=True), expected, strict=True):
         assert np.array_equal(np.concatenate(ours), theirs)

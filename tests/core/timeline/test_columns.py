@@ -12,15 +12,15 @@ THERE: tuple[Segment, ...] = ("pelvis", "foot_l", "foot_r")
 
 def test_the_same_sensors_in_the_same_order_need_no_columns() -> None:
     assert find_columns(list(THERE), THERE) is None
-    for wanted, columns in (
+    for expected, columns in (
         (("pelvis", "foot_l"), [0, 1]),
         (("foot_r", "pelvis"), [2, 0]),
         (("foot_r", "foot_l", "pelvis"), [2, 1, 0]),
         ((), []),
     ):
-        found = find_columns(wanted, THERE)  # type: ignore[arg-type]
-        assert found is not None
-        assert found.tolist() == columns
+        result = find_columns(expected, THERE)  # type: ignore[arg-type]
+        assert result is not None
+        assert result.tolist() == columns
 
 
 def test_some_columns_are_copied_in_order_and_all_are_handed_on() -> None:

@@ -83,7 +83,7 @@ def device(
 
 
 def own(d: Device, ahead_us: int, drift: float = 1.0, delay_us: int = 20_000) -> Device:
-    """The same device on a clock of its own."""
+    """The same device on a separate clock."""
     t_us: NDArray[np.int64] = np.rint(d.t_us * drift).astype(np.int64) + ahead_us
     return replace(
         d, info=replace(d.info, clock="own"), t_us=t_us, ahead_us=ahead_us, drift=drift, delay_us=delay_us
@@ -173,8 +173,8 @@ def test_jittering_samples_are_interpolated_as_in_the_file() -> None:
     block, _, axis = laid(take)
     assert_equal_bits(block, axis.segments, of_file(take))
     assert block.valid.mean() > 0.99
-    again, _, _ = laid(take.cut(4))
-    assert again.acc.tobytes() == block.acc.tobytes()
+    repeat, _, _ = laid(take.cut(4))
+    assert repeat.acc.tobytes() == block.acc.tobytes()
 
 
 @pytest.mark.slow
@@ -191,11 +191,11 @@ def test_whatever_is_lost_and_however_times_jitter_the_points_are_those_of_the_f
         samples = d.samples.copy()
         samples[rng.random(samples.shape[:2]) < 0.15 * rng.random()] = np.nan
         shift = rng.integers(-4000, 4000, len(d.t_us))
-        kept = rng.random(len(d.t_us)) > 0.1 * rng.random()
-        kept[:3] = kept[-3:] = True
+        retained = rng.random(len(d.t_us)) > 0.1 * rng.random()
+        retained[:3] = retained[-3:] = True
         samples[:3] = samples[-3:] = 0.5 + number
         devices.append(
-            replace(d, t_us=(d.t_us + shift)[kept], samples=samples[kept], jitter=True, delay_us=1000)
+            replace(d, t_us=(d.t_us + shift)[retained], samples=samples[retained], jitter=True, delay_us=1000)
         )
     take = send(devices, n)
     block, _, axis = laid(take)
@@ -290,8 +290,8 @@ def test_long_batches_are_not_taken_for_silence() -> None:
 def test_a_stream_that_never_comes_is_waited_for_three_seconds() -> None:
     first, second = device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",))
     take = send([first, second])
-    alone = LiveTake(take.hello, tuple(b for b in take.batches if b.stream == 0))
-    block, notices, _ = laid(alone)
+    single = LiveTake(take.hello, tuple(b for b in take.batches if b.stream == 0))
+    block, notices, _ = laid(single)
     assert [n.code for n in notices] == ["sensor_missing"]
     assert len(block) == 2000, "what was held back is not lost"
     assert block.valid[:, 0].all()
@@ -339,18 +339,18 @@ def test_a_sender_that_slept_leaves_a_gap() -> None:
 def test_no_clock_makes_more_samples_than_a_file_could_be_analysed_with() -> None:
     clean = device(0, 100.0, FEET, 2.0)
     axis = LiveAxis(send([clean]).hello)
-    made = 0
+    output = 0
     for k in range(60):
-        at = k * 599_000_000
-        block = axis.push(SampleBatch(0, k, at, at, clean.samples[:1]))
-        made += 0 if block is None else len(block)
-    assert made < 20 * 60 + 60_000
+        position = k * 599_000_000
+        block = axis.push(SampleBatch(0, k, position, position, clean.samples[:1]))
+        output += 0 if block is None else len(block)
+    assert output < 20 * 60 + 60_000
 
 
 def test_a_shared_clock_that_is_not_does_not_stop_the_others() -> None:
     first, second = device(0, 100.0, ("foot_l",)), device(1, 100.0, ("foot_r",))
-    behind = replace(second, t_us=second.t_us + 900_000_000, ahead_us=900_000_000)
-    block, _, _ = laid(send([first, behind]))
+    variant = replace(second, t_us=second.t_us + 900_000_000, ahead_us=900_000_000)
+    block, _, _ = laid(send([first, variant]))
     assert len(block) > 1000
 
 

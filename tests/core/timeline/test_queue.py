@@ -1,4 +1,4 @@
-"""One stream before it is laid: what it holds, what runs backwards, and when it is overdue."""
+"""One stream before alignment: content, reversed times, overdue detection."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ INFO = StreamInfo(
 def hold(queue: StreamQueue, times_us: list[int], sent_us: int = 0, *, offsets: bool = False) -> bool:
     t_us = np.array(times_us, np.int64)
     samples = np.repeat(t_us, 27).reshape(-1, 3, 9).astype(np.float32)
-    told = (t_us - t_us[0]).astype(np.uint32) if offsets else None
-    return queue.hold(t_us, SampleBatch(4, 0, times_us[0], sent_us, samples, told))
+    notices = (t_us - t_us[0]).astype(np.uint32) if offsets else None
+    return queue.hold(t_us, SampleBatch(4, 0, times_us[0], sent_us, samples, notices))
 
 
 def held(queue: StreamQueue) -> list[int]:

@@ -1,4 +1,4 @@
-"""One axis for all sensors: alignment, holes, rates, and takes that cannot be laid on one."""
+"""Common axis of all sensors: alignment, gaps, rates, and impossible trials."""
 
 from __future__ import annotations
 
@@ -37,19 +37,19 @@ def test_samples_on_the_axis_are_copied_bit_for_bit() -> None:
 
 def test_signals_without_a_hole_are_held_once() -> None:
     def laid(acc: Floats, t_s: Floats) -> tuple[ImuStream, SensorSignals]:
-        given = stream("a", acc, GYR, t_s=t_s)
-        return given, synchronise(take({"pelvis": given})).sensors["pelvis"]
+        inputs = stream("a", acc, GYR, t_s=t_s)
+        return inputs, synchronise(take({"pelvis": inputs})).sensors["pelvis"]
 
-    on_axis, between = np.arange(1000) / 100.0, np.arange(1000) / 100.0 + 0.002 * (np.arange(1000) > 500)
-    given, whole = laid(ACC, on_axis)
-    assert given.gyr is not None
-    assert np.shares_memory(whole.acc, given.acc)
-    assert np.shares_memory(whole.gyr, given.gyr)
-    given, moved = laid(ACC.copy(), between)
-    assert not np.shares_memory(moved.acc, given.acc)
+    on_axis, gap = np.arange(1000) / 100.0, np.arange(1000) / 100.0 + 0.002 * (np.arange(1000) > 500)
+    inputs, whole = laid(ACC, on_axis)
+    assert inputs.gyr is not None
+    assert np.shares_memory(whole.acc, inputs.acc)
+    assert np.shares_memory(whole.gyr, inputs.gyr)
+    inputs, moved = laid(ACC.copy(), gap)
+    assert not np.shares_memory(moved.acc, inputs.acc)
     # by columns in memory: sums over the rows would round otherwise
-    given, turned = laid(np.asfortranarray(ACC), on_axis)
-    assert not np.shares_memory(turned.acc, given.acc)
+    inputs, turned = laid(np.asfortranarray(ACC), on_axis)
+    assert not np.shares_memory(turned.acc, inputs.acc)
     assert turned.acc.flags.c_contiguous
     np.testing.assert_array_equal(turned.acc, ACC)
 
@@ -153,14 +153,17 @@ def test_a_sensor_that_stops_early_does_not_cut_the_others() -> None:
 
 def test_notices_of_files_and_sensors_travel_with_the_axis() -> None:
     recording = take({"pelvis": stream("a", ACC, GYR)}, other=stream("b", ACC + 1, None))
-    said = Notice("ignored_file", "readme.txt is a text and was not used.", severity="info")
-    object.__setattr__(recording, "notices", (said,))
-    assert said in synchronise(recording).notices
+    message = Notice("ignored_file", "readme.txt is a text and was not used.", severity="info")
+    object.__setattr__(recording, "notices", (message,))
+    assert message in synchronise(recording).notices
 
 
 def test_a_worn_sensor_without_gyroscope_is_left_out() -> None:
-    worn: dict[Segment, ImuStream] = {"pelvis": stream("a", ACC, GYR), "foot_l": stream("b", ACC + 1, None)}
-    assert list(synchronise(take(worn)).sensors) == ["pelvis"]
+    segments: dict[Segment, ImuStream] = {
+        "pelvis": stream("a", ACC, GYR),
+        "foot_l": stream("b", ACC + 1, None),
+    }
+    assert list(synchronise(take(segments)).sensors) == ["pelvis"]
 
 
 def test_a_magnetometer_has_its_own_holes() -> None:

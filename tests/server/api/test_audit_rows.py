@@ -136,17 +136,17 @@ CHANGES: dict[str, dict[str, Any]] = {
 
 
 class Visits:
-    """A patient with two analysed sessions, and what the addresses of the routes need of them."""
+    """Patient with two analysed sessions, and the ids needed by the routes."""
 
     def __init__(self, clinic: Clinic) -> None:
         self.clinic = clinic
         make_keys(clinic.settings.identity_key_file)
         with clinic.db.write() as c:
             patient = patients.create(c, None, code="P-1", height_m=1.75).id
-            this, other = (sessions.create(c, None, patient).id for _ in range(2))
+            this, second = (sessions.create(c, None, patient).id for _ in range(2))
             squats = sessions.create(c, None, patient, protocol="squat").id
         analysed.finish(clinic, patient, squats, analysed.files())
-        analysed.finish(clinic, patient, other, analysed.files())
+        analysed.finish(clinic, patient, second, analysed.files())
         analysis = analysed.finish(clinic, patient, this, analysed.files())
         with clinic.db.write() as c:
             first = c.execute(job.select().limit(1)).one()
@@ -178,15 +178,15 @@ class Visits:
             "pid": patient,
             "session_id": this,
             "sid": this,
-            "other_id": other,
-            "other": other,
+            "other_id": second,
+            "other": second,
             "analysis_id": analysis,
             "job_id": job_id,
             "tuning_id": tuning_id,
             "run_id": run,
             "sensitivity_id": sensitivity,
         }
-        self.ids = {patient, this, other, analysis, job_id, tuning_id, run, squats, sensitivity, None}
+        self.ids = {patient, this, second, analysis, job_id, tuning_id, run, squats, sensitivity, None}
 
     def address(self, route: str) -> str:
         """The route with its parameters filled; fails for one that this test does not know."""
@@ -202,11 +202,11 @@ class Visits:
         if path.startswith(f"{API}/filter-runs"):
             names["files"] = "filters.csv"
 
-        def value(found: re.Match[str]) -> str:
-            name = found[1]
+        def value(result: re.Match[str]) -> str:
+            name = result[1]
             if name == "session_id" and path.endswith("/sensitivities"):
                 return self.squats
-            return names[path[: found.start()].split("/")[-2]] if name == "name" else self.values[name]
+            return names[path[: result.start()].split("/")[-2]] if name == "name" else self.values[name]
 
         return re.sub(r"\{(\w+)(?::path)?\}", value, path) + QUERY.get(route, "")
 
@@ -219,8 +219,8 @@ class Visits:
 
     def rows_of(self, name: str, since: int) -> list[Any]:
         """Rows about these visits by a person since a row."""
-        found = [r for r in self.rows() if r.seq > since and r.user_name == name]
-        return [r for r in found if r.resource_id in self.ids or r.resource == "recording"]
+        result = [r for r in self.rows() if r.seq > since and r.user_name == name]
+        return [r for r in result if r.resource_id in self.ids or r.resource == "recording"]
 
 
 @asynccontextmanager
@@ -259,9 +259,9 @@ async def test_every_route_that_shows_patient_data_leaves_an_audit_row(tmp_path:
         for route in routes:
             if route in WITHOUT_A_ROW or route.endswith(".pdf"):  # PDFs: pages/test_report.py
                 continue
-            before = v.newest()
+            initial = v.newest()
             await _look(v, route, port)
-            if not v.rows_of("clinician", before):
+            if not v.rows_of("clinician", initial):
                 silent.append(route)
         assert silent == []
 
@@ -275,25 +275,25 @@ async def test_every_route_that_changes_patient_data_leaves_an_audit_row(tmp_pat
         silent = []
         async with v.clinic.client("admin") as client:
             for route, body in CHANGES.items():
-                before = v.newest()
+                initial = v.newest()
                 answer = await client.request(route.split()[0], v.address(route), **body)
                 assert answer.status_code < 300, f"{route}: {answer.text}"
-                made = answer.json() if answer.content else {}
-                if "offset" in made:
-                    v.values |= {"upload_id": made["id"]}
-                    part = f"{v.address(route)}/{made['id']}"
+                result = answer.json() if answer.content else {}
+                if "offset" in result:
+                    v.values |= {"upload_id": result["id"]}
+                    part = f"{v.address(route)}/{result['id']}"
                     await client.patch(part, content=b"x", headers={"Upload-Offset": "0"})
-                if "visits" in made:
-                    v.values |= {"programme_id": made["id"], "visit_id": made["visits"][0]["id"]}
-                if "evidence" in made:
-                    v.values |= {"consent_id": made["id"]}
-                if "id" in made and "sha256" in made:
-                    v.values["report_id"] = made["id"]
-                if "link" in made:
-                    v.values["link_id"] = made["link"]["id"]
-                if "content" in made:
-                    v.values |= {"prescription_id": made["id"], "note_id": made["id"]}
-                if not [r for r in v.rows() if r.seq > before and r.user_name == "admin"]:
+                if "visits" in result:
+                    v.values |= {"programme_id": result["id"], "visit_id": result["visits"][0]["id"]}
+                if "evidence" in result:
+                    v.values |= {"consent_id": result["id"]}
+                if "id" in result and "sha256" in result:
+                    v.values["report_id"] = result["id"]
+                if "link" in result:
+                    v.values["link_id"] = result["link"]["id"]
+                if "content" in result:
+                    v.values |= {"prescription_id": result["id"], "note_id": result["id"]}
+                if not [r for r in v.rows() if r.seq > initial and r.user_name == "admin"]:
                     silent.append(route)
         assert silent == []
 
@@ -312,11 +312,11 @@ async def test_watching_is_one_row_of_each_sign_in_and_quarter_of_an_hour(tmp_pa
         def rows() -> int:
             return sum(r.action == "signals.opened" for r in v.rows(1000))
 
-        async with v.clinic.client("viewer") as client, v.clinic.client("viewer") as again:
+        async with v.clinic.client("viewer") as client, v.clinic.client("viewer") as second_client:
             for _ in range(5):
                 await client.get(path)
             assert rows() == 1
-            await again.get(path)
+            await second_client.get(path)
             assert rows() == 2
             time_s += QUIET_S
             await client.get(path)
@@ -332,7 +332,7 @@ async def _fail(clinic: Clinic, **person: str) -> None:
 @pytest.mark.slow
 async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) -> None:
     async with opened(tmp_path) as v:
-        known = v.clinic.user("viewer")
+        reference = v.clinic.user("viewer")
         await _fail(v.clinic, name="viewer", password="swordfish-of-the-viewer")
         await _fail(v.clinic, name="swordfish-as-a-name", password="x")
         async with v.clinic.client() as client:
@@ -344,11 +344,11 @@ async def test_a_failed_sign_in_is_a_row_without_what_was_typed(tmp_path: Path) 
             assert (await client.post(f"{API}/account/password", json=change)).status_code == 403
         rows = list(reversed(v.rows(5)))
         assert [(r.action, r.resource_id, r.user_id, r.detail) for r in rows] == [
-            ("sign_in.failed", known, None, {"address": "127.0.0.1"}),
+            ("sign_in.failed", reference, None, {"address": "127.0.0.1"}),
             ("sign_in.failed", None, None, {"address": "127.0.0.1"}),
             ("sign_in.failed", None, None, {"address": "127.0.0.1"}),
             ("live.pairing_failed", None, None, {"address": "127.0.0.1"}),
-            ("sign_in.failed", known, None, {"address": "127.0.0.1"}),
+            ("sign_in.failed", reference, None, {"address": "127.0.0.1"}),
         ]
         assert "swordfish" not in str(v.rows(1000))
         person = {"name": "viewer", "password": PASSWORD}

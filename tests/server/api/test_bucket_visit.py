@@ -1,4 +1,4 @@
-"""A visit whose files are in a bucket, from the upload to its erasure, and what is seen while it is away."""
+"""Visit with files in a bucket: upload, analysis, erasure, and an unavailable bucket."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ async def done(client: httpx.AsyncClient, answer: httpx.Response) -> None:
 
 
 async def walk(client: httpx.AsyncClient, path: str) -> None:
-    """Upload a simulated walk and have it analysed, with a film beside it."""
-    made = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=3)
-    for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+    """Upload and analyse a simulated walk with a video."""
+    simulation = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=3)
+    for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
         assert (await client.put(f"{path}/files/{name}", content=content)).status_code == 201
     await done(client, await client.post(f"{path}/inspections"))
-    said = {"manifest": {"sensors": dict(made.recording.segments)}}
-    await done(client, await client.post(f"{path}/analyses", json=said))
+    message = {"manifest": {"sensors": dict(simulation.recording.segments)}}
+    await done(client, await client.post(f"{path}/analyses", json=message))
     await done(client, await client.post(f"{path}/exports", json={"kind": "xlsx"}))
     filmed = await client.put(f"{path}/video?name=a.webm&consent=true", content=FILM)
     assert filmed.status_code == 201
@@ -119,15 +119,15 @@ async def _use_while_away(
     assert bucket.name not in page.text
     for still in ("/patients", f"/patients/{patient}", f"/sessions/{session}/live"):
         assert (await client.get(still, headers=HTML)).status_code == 200, still
-    asked: Any
-    for method, what, asked in (
+    requests: Any
+    for method, label, requests in (
         ("GET", f"{path}/report", {}),
         ("GET", f"{path}/video/content", {}),
         ("GET", f"{path}/archive.zip", {}),
         ("PUT", f"{path}/files/other.txt", {"content": b"walk"}),
     ):
-        answer = await client.request(method, what, **asked)
-        assert (answer.status_code, answer.json()["code"]) == (503, "store_away"), what
+        answer = await client.request(method, label, **requests)
+        assert (answer.status_code, answer.json()["code"]) == (503, "store_away"), label
     ready = await client.get("/health/ready")
     assert ready.status_code == 503
     assert ready.json()["checks"]["files"].startswith("The bucket of stored files cannot be reached;")

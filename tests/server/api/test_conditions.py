@@ -49,8 +49,8 @@ async def test_a_condition_is_stated_with_a_session_and_changed_later(clinic: Cl
         assert (changed["pace"], changed["aid"], changed["shoes"]) == ("fast", "rollator", None)
         refused = await client.patch(path, json={"aid": "broom"})
         assert (refused.status_code, refused.json()["errors"][0]["field"]) == (422, "aid")
-        made = (await client.post(f"{API}/patients/{patient}/sessions", json=FAST)).json()
-        assert {name: made[name] for name in FAST} == FAST
+        body = (await client.post(f"{API}/patients/{patient}/sessions", json=FAST)).json()
+        assert {name: body[name] for name in FAST} == FAST
 
 
 @pytest.mark.slow
@@ -68,16 +68,16 @@ async def test_a_fast_walk_is_not_what_a_comfortable_one_is_compared_with(clinic
 @pytest.mark.slow
 async def test_belts_of_another_speed_are_not_compared(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
-    made = []
+    result = []
     for days, speed in ((0, 0.83), (7, 1.11), (14, 0.83)):
         session = feedback.visit(clinic, patient, days, protocol="treadmill", **OWN)
         belt = {"belt_speed_mps": speed, "protocol": "treadmill"}
         analysed.finish(clinic, patient, session, analysed.files(24.0), belt)
-        made.append(session)
-    slow, quick, again = made
-    assert [await _since(clinic, s) for s in made] == [None, None, slow]
+        result.append(session)
+    slow, quick, second = result
+    assert [await _since(clinic, s) for s in result] == [None, None, slow]
     answer = await _get(clinic, f"{API}/patients/{patient}/trends")
-    assert [v["session_id"] for v in answer["visits"]] == [slow, again]
+    assert [v["session_id"] for v in answer["visits"]] == [slow, second]
     assert [o["session_id"] for o in answer["others"]] == [quick]
     assert answer["others"][0]["condition"]["belt_speed_mps"] == 1.11
 
@@ -101,8 +101,10 @@ async def test_a_trend_follows_one_condition_and_offers_the_others(clinic: Clini
     rows = list(csv.DictReader(io.StringIO(await _get(clinic, f"{path}.csv?like={fast}"))))
     assert {(r["session_id"], r["condition"]) for r in rows} == {(fast, "fast, no aid, shoes")}
     async with clinic.client("viewer") as client:
-        other = await client.get(f"{path}?like={feedback.walked(clinic, feedback.person(clinic), 0)}")
-    assert other.status_code == 404
+        other_response = await client.get(
+            f"{path}?like={feedback.walked(clinic, feedback.person(clinic), 0)}"
+        )
+    assert other_response.status_code == 404
 
 
 async def test_the_newest_own_pace_is_followed_though_a_fast_walk_came_after(clinic: Clinic) -> None:
@@ -118,11 +120,11 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     own = feedback.walked(clinic, patient, 0, **OWN)
     fast = feedback.walked(clinic, patient, 7, 12.0, **FAST)
     alike = feedback.walked(clinic, patient, 8, 12.0, **OWN)
-    found = await _get(clinic, f"{API}/sessions/{fast}/compare/{own}")
-    assert found["comparable"] is False
-    assert "own pace, then fast" in found["cautions"][0]
-    assert [c["condition"]["pace"] for c in (found["before"], found["after"])] == ["comfortable", "fast"]
-    there = [c for c in found["changes"] if c["difference"] is not None]
+    value = await _get(clinic, f"{API}/sessions/{fast}/compare/{own}")
+    assert value["comparable"] is False
+    assert "own pace, then fast" in value["cautions"][0]
+    assert [c["condition"]["pace"] for c in (value["before"], value["after"])] == ["comfortable", "fast"]
+    there = [c for c in value["changes"] if c["difference"] is not None]
     assert there
     assert {(c["verdict"], c["towards_norm"]) for c in there} == {(None, None)}
     assert {c["words"] for c in there} == {"not assessed: the conditions differ"}
@@ -131,17 +133,17 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     assert "real change" not in page.lower()
     rows = csv.DictReader(io.StringIO(await _get(clinic, f"{API}/sessions/{fast}/compare/{own}/changes.csv")))
     assert {(r["verdict"], r["reason"]) for r in rows if r["change"]} == {("", "conditions_differ")}
-    judged = await _get(clinic, f"{API}/sessions/{alike}/compare/{own}")
-    assert judged["comparable"] is True
-    assert {c["verdict"] for c in judged["changes"]} >= {"within_measurement_error"}
+    response = await _get(clinic, f"{API}/sessions/{alike}/compare/{own}")
+    assert response["comparable"] is True
+    assert {c["verdict"] for c in response["changes"]} >= {"within_measurement_error"}
 
 
 async def test_walks_of_unstated_condition_are_compared_with_a_caution(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     one, two = feedback.walked(clinic, patient, 0), feedback.walked(clinic, patient, 7)
-    found = await _get(clinic, f"{API}/sessions/{two}/compare/{one}")
-    assert found["comparable"] is True
-    assert found["cautions"] == [
+    response = await _get(clinic, f"{API}/sessions/{two}/compare/{one}")
+    assert response["comparable"] is True
+    assert response["cautions"] == [
         "Not stated for either visit: pace, aid, orthosis, shoes. Assumed to be the same."
     ]
     assert await _since(clinic, two) == one
@@ -151,17 +153,17 @@ async def test_walks_of_unstated_condition_are_compared_with_a_caution(clinic: C
 @pytest.mark.slow
 async def test_a_training_with_feedback_is_a_small_mark_and_never_a_baseline(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
-    told = feedback.walked(clinic, patient, 0, feedback=True, **OWN)
+    notices = feedback.walked(clinic, patient, 0, feedback=True, **OWN)
     first = feedback.walked(clinic, patient, 2, **OWN)
-    again = feedback.walked(clinic, patient, 5, feedback=True, **OWN)
+    second = feedback.walked(clinic, patient, 5, feedback=True, **OWN)
     later = feedback.walked(clinic, patient, 9, **OWN)
     # whatever the programme calls it
     with clinic.db.write() as c:
         plan = programmes.start(c, None, patient, starts_on=dt.date(2026, 3, 9))
         visits = {v.label: v.id for v in plan.visits}
-        programmes.change_visit(c, None, visits["PRE"], {"session_id": told})
-    assert [await _since(clinic, s) for s in (told, first, again, later)] == [None, None, None, first]
-    assert "Walked with feedback: shown, not compared" in await _get(clinic, f"/sessions/{again}")
+        programmes.change_visit(c, None, visits["PRE"], {"session_id": notices})
+    assert [await _since(clinic, s) for s in (notices, first, second, later)] == [None, None, None, first]
+    assert "Walked with feedback: shown, not compared" in await _get(clinic, f"/sessions/{second}")
     answer = await _get(clinic, f"{API}/patients/{patient}/trends?show=stance_pct")
     kinds = ["training", "assessment", "training", "assessment"]
     assert [v["kind"] for v in answer["visits"]] == kinds
@@ -170,8 +172,8 @@ async def test_a_training_with_feedback_is_a_small_mark_and_never_a_baseline(cli
         assert [p["change"] is None for p in line["points"]] == [True, True, True, False]
     page = await _get(clinic, f"/patients/{patient}/trends?show=stance_pct")
     assert (page.count('class="pl-l"'), page.count('class="ps-l"')) == (2, 2)
-    found = await _get(clinic, f"{API}/sessions/{again}/compare/{told}")
-    assert found["comparable"] is False
+    response = await _get(clinic, f"{API}/sessions/{second}/compare/{notices}")
+    assert response["comparable"] is False
 
 
 async def test_a_training_with_feedback_is_no_own_baseline_of_a_prescription(clinic: Clinic) -> None:
@@ -182,7 +184,7 @@ async def test_a_training_with_feedback_is_no_own_baseline_of_a_prescription(cli
         offers = await _get(clinic, path)
         return next(o for o in offers if o["source"] == "own_baseline")
 
-    told = feedback.walked(clinic, patient, 0, feedback=True, **OWN)
+    notices = feedback.walked(clinic, patient, 0, feedback=True, **OWN)
     assert (await own())["mean"] is None
     assert "without feedback" in (await own())["reason"]
     feedback.walked(clinic, patient, 3, **OWN)
@@ -192,7 +194,7 @@ async def test_a_training_with_feedback_is_no_own_baseline_of_a_prescription(cli
     body = {
         "parameter": "stance_pct",
         "side": "left",
-        "target": {"source": "own_baseline", "session_id": told},
+        "target": {"source": "own_baseline", "session_id": notices},
     }
     async with clinic.client("clinician") as client:
         answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=body)
@@ -210,9 +212,9 @@ async def test_a_take_is_coached_from_the_walk_in_its_own_condition(clinic: Clin
         answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=body)
     assert answer.status_code == 201
     with clinic.db.read() as c:
-        found = prescriptions.for_take(c, clinic.app.state.reviewed, today)
-    assert found is not None
-    assert found[1].session_id == aided
+        result = prescriptions.for_take(c, clinic.app.state.reviewed, today)
+    assert result is not None
+    assert result[1].session_id == aided
 
 
 async def test_only_unaided_walks_of_controls_are_a_reference(clinic: Clinic) -> None:
@@ -227,8 +229,8 @@ async def test_only_unaided_walks_of_controls_are_a_reference(clinic: Clinic) ->
     this = feedback.walked(clinic, patient, 0, **OWN)
     with clinic.db.read() as c:
         code = patients.get(c, healthy).code
-        known = controls.list_visits(c, patients.get(c, patient), sessions.get(c, this))
-    assert {v.found.session_id for v in known if v.person == code} == {plain, fast, silent}
+        known_visits = controls.list_visits(c, patients.get(c, patient), sessions.get(c, this))
+    assert {v.found.session_id for v in known_visits if v.person == code} == {plain, fast, silent}
 
 
 @pytest.mark.slow
@@ -256,16 +258,16 @@ async def test_the_take_that_counts_says_whether_there_was_feedback(clinic: Clin
     patient = feedback.person(clinic)
     body = {"parameter": "stance_pct", "side": "left", "target": {"source": "manual", "mean": 64, "sd": 1}}
     async with clinic.client("clinician") as client:
-        made = await client.post(f"{API}/patients/{patient}/prescriptions", json=body)
-    prescription = made.json()["id"]
-    session, other = feedback.visit(clinic, patient, 0), feedback.visit(clinic, patient, 1, feedback=True)
-    shown = Cue(1, "left", 1.0, 2.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
-    hidden = replace(shown, shown=False, why_not="probe")
+        response = await client.post(f"{API}/patients/{patient}/prescriptions", json=body)
+    prescription = response.json()["id"]
+    session, second = feedback.visit(clinic, patient, 0), feedback.visit(clinic, patient, 1, feedback=True)
+    view = Cue(1, "left", 1.0, 2.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
+    hidden = replace(view, shown=False, why_not="probe")
     for at, cue, noted in (
         (session, hidden, False),
-        (session, shown, True),
+        (session, view, True),
         (session, hidden, False),  # recorded once more without feedback
-        (other, hidden, True),  # somebody said so, and no take says otherwise
+        (second, hidden, True),  # somebody said so, and no take says otherwise
     ):
         take = feedback.take(clinic, at, prescription, [cue])
         with clinic.db.write() as c:
@@ -288,9 +290,9 @@ async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and
         assert words in screen
     begins = paper.index("r-tbl params")
     sentences, table = paper[paper.index('class="r-short"') : begins], paper[begins:]
-    told, marked = (
+    notices, marked = (
         set(re.findall(r'class="rank" aria-hidden="true">(\d)', part)) for part in (sentences, table)
     )
-    assert marked <= told
+    assert marked <= notices
     assert f"/compare/{first}" not in paper
     assert re.search(r"\d+ within error, \d+ not judged", sentences)

@@ -1,4 +1,4 @@
-"""A clinic's own controls, and the side that is affected: what they add to a report."""
+"""Own controls and affected side in a report."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ CONTROLS = 5
 @pytest.fixture(scope="module")
 async def clinic(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Clinic]:
     """Five controls and one patient, all analysed."""
-    async with open_clinic(tmp_path_factory.mktemp("controls")) as made:
-        workers = Workers(made.settings)
+    async with open_clinic(tmp_path_factory.mktemp("controls")) as result:
+        workers = Workers(result.settings)
         workers.start()
         try:
-            async with made.client("clinician", timeout=300) as client:
+            async with result.client("clinician", timeout=300) as client:
                 for k in range(CONTROLS):
                     await analysed(client, k + 1, code=f"C-{k}", is_control=True)
                 await analysed(client, 9, code="P-1", affected_side="right", birth_year=1970)
-            yield made
+            yield result
         finally:
             workers.stop()
 
@@ -54,8 +54,8 @@ async def report(clinic: Clinic, code: str) -> dict[str, Any]:
         (session,) = (await client.get(f"{API}/patients/{patient['id']}/sessions")).json()
         answer = await client.get(f"{API}/sessions/{session['id']}/report")
         assert answer.status_code == 200
-        found: dict[str, Any] = answer.json()
-        return found
+        fields: dict[str, Any] = answer.json()
+        return fields
 
 
 async def change(clinic: Clinic, code: str, **values: Any) -> None:
@@ -66,27 +66,27 @@ async def change(clinic: Clinic, code: str, **values: Any) -> None:
         assert answer.status_code == 200
 
 
-def row(found: dict[str, Any], name: str) -> dict[str, Any]:
-    return next(r for r in found["parameters"] if r["name"] == name)
+def row(result: dict[str, Any], name: str) -> dict[str, Any]:
+    return next(r for r in result["parameters"] if r["name"] == name)
 
 
 async def test_what_no_table_compares_is_held_against_own_controls(clinic: Clinic) -> None:
-    found = await report(clinic, "P-1")
-    path = row(found, "circumduction_m")
+    result = await report(clinic, "P-1")
+    path = row(result, "circumduction_m")
     assert path["norm_n"] == CONTROLS
     assert "controls of this clinic" in path["norm_source"]
     assert abs(path["left"]["z"]) < 5.0
-    assert "own controls" in found["norm_note"]
-    knee = row(found, "knee_flexion_rom_deg")
+    assert "own controls" in result["norm_note"]
+    knee = row(result, "knee_flexion_rom_deg")
     assert "controls of this clinic" not in knee["norm_source"], "a published norm goes first"
-    limits = [r for kind in ("beyond", "within") for r in found["limits"][kind]]
+    limits = [r for kind in ("beyond", "within") for r in result["limits"][kind]]
     assert any("own controls" in r["source"] for r in limits)
 
 
 async def test_a_control_is_not_held_against_themselves_and_four_are_too_few(clinic: Clinic) -> None:
-    found = await report(clinic, "C-0")
-    assert row(found, "circumduction_m")["norm"] is None
-    assert "too few" in found["norm_note"]
+    result = await report(clinic, "C-0")
+    assert row(result, "circumduction_m")["norm"] is None
+    assert "too few" in result["norm_note"]
 
 
 async def test_who_takes_the_agreement_back_is_no_control_any_more(clinic: Clinic) -> None:

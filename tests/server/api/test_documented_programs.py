@@ -1,4 +1,4 @@
-"""The programs of docs/reference/api.md do what it says, against a real server with a real worker."""
+"""Run the programs of docs/reference/api.md against a real server and worker."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
     assert set(PROGRAMS) == set(RUNNERS)
     if shutil.which("curl") is None:
         pytest.skip("curl is not installed")
-    made = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=5)
+    simulation = simulate((Stand(5.0), Straight(12.8, 0.64, 0.54), Stand(4.0)), seed=5)
     take = tmp_path / "take"
     take.mkdir()
-    for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+    for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
         (take / name).write_bytes(content)
-    (take / "manifest.json").write_text(json.dumps({"sensors": dict(made.recording.segments)}))
+    (take / "manifest.json").write_text(json.dumps({"sensors": dict(simulation.recording.segments)}))
     async with open_clinic(tmp_path / "data") as clinic, serve(clinic.app) as port:
         clinic.user("clinician")
         workers = Workers(clinic.settings)
         workers.start()
         try:
             for language, program in PROGRAMS.items():
-                here = tmp_path / language
-                here.mkdir()
-                await _run([*RUNNERS[language], program], here, f"http://127.0.0.1:{port}", take)
+                address = tmp_path / language
+                address.mkdir()
+                await _run([*RUNNERS[language], program], address, f"http://127.0.0.1:{port}", take)
         finally:
             workers.stop()
     assert "stride_time_s,left" in (tmp_path / "bash" / "parameters.csv").read_text()
@@ -54,10 +54,10 @@ async def test_the_programs_upload_analyse_and_download(tmp_path: Path) -> None:
     assert (tmp_path / "python" / "angles.parquet").stat().st_size > 1000
 
 
-async def _run(command: list[str], here: Path, url: str, take: Path) -> None:
+async def _run(command: list[str], place: Path, url: str, take: Path) -> None:
     env = {**os.environ, "URL": url, "NAME": "clinician", "PASSWORD": PASSWORD, "FILES": str(take)}
     process = await asyncio.create_subprocess_exec(
-        *command, cwd=here, env=env, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
+        *command, cwd=place, env=env, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.STDOUT
     )
     output, _ = await asyncio.wait_for(process.communicate(), 300)
     assert process.returncode == 0, output.decode()

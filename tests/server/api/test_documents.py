@@ -1,4 +1,4 @@
-"""What the OpenAPI document declares and the server does: media types, methods, refusals."""
+"""OpenAPI document and server agree on media types, methods and refusals."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ async def test_allow_names_every_method_of_a_path(clinic: Clinic) -> None:
     paths = openapi(clinic.app)["paths"]
     for path, item in paths.items():
         pattern = re.compile(re.sub(r"\{\w+\}", "[^/]+", path))
-        for other in paths:
-            if pattern.fullmatch(fill(other)):
-                offered.setdefault(other, set()).update(method.upper() for method in item)
+        for second in paths:
+            if pattern.fullmatch(fill(second)):
+                offered.setdefault(second, set()).update(method.upper() for method in item)
     assert any(len(methods) > 2 for methods in offered.values())
     async with clinic.client("admin") as client:
         for path, methods in offered.items():

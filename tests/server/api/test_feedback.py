@@ -1,4 +1,4 @@
-"""After a live take: its cues beside the strides of the analysis, and retention at the next visit."""
+"""Cues of a live trial assigned to analysed strides, and retention at the next visit."""
 
 from __future__ import annotations
 
@@ -34,24 +34,26 @@ async def _prescribe(clinic: Clinic, patient: str) -> str:
     return str(answer.json()["id"])
 
 
-def _live(clinic: Clinic, session: str, given: Prescription, baseline: Baseline) -> tuple[list[Cue], str]:
+def _live(clinic: Clinic, session: str, inputs: Prescription, baseline: Baseline) -> tuple[list[Cue], str]:
     """The cues that the strides of a session's analysis would have got, and its recording."""
     reviewed = clinic.app.state.reviewed
     with clinic.db.read() as c:
-        found = analyses.get_shown(c, session)
-        edits = edit_log.edits_of(c, found.id)
-    strides = reviewed.read_bundle(found, edits).strides.strides
-    column = reviewed.read_columns(found, edits)[given.parameter]
-    engine = FeedbackEngine(given, baseline)
+        analysis = analyses.get_shown(c, session)
+        edits = edit_log.edits_of(c, analysis.id)
+    strides = reviewed.read_bundle(analysis, edits).strides.strides
+    column = reviewed.read_columns(analysis, edits)[inputs.parameter]
+    engine = FeedbackEngine(inputs, baseline)
     cues = []
     for n, (s, value) in enumerate(zip(strides, column, strict=True)):
-        counted = s.excluded_reason is None
-        told = None if value is None else value + TOLD
-        stride = Walked(n, s.side, s.start_s - 0.03, s.end_s, s.end_s, {given.parameter: told}, {}, counted)
+        counted_strides = s.excluded_reason is None
+        notices = None if value is None else value + TOLD
+        stride = Walked(
+            n, s.side, s.start_s - 0.03, s.end_s, s.end_s, {inputs.parameter: notices}, {}, counted_strides
+        )
         cue = engine.push(stride)
         if cue is not None:
             cues.append(cue)
-    return cues, found.recording_id
+    return cues, analysis.recording_id
 
 
 async def _train(
@@ -59,9 +61,9 @@ async def _train(
 ) -> tuple[str, list[Cue]]:
     session = feedback.walked(clinic, patient, days, 48.0, **values)
     with clinic.db.read() as c:
-        given = prescriptions.for_take(c, clinic.app.state.reviewed, session)
-    assert given is not None
-    cues, recording = _live(clinic, session, *given)
+        inputs = prescriptions.for_take(c, clinic.app.state.reviewed, session)
+    assert inputs is not None
+    cues, recording = _live(clinic, session, *inputs)
     feedback.take(clinic, session, prescription, cues, recording)
     return session, cues
 
@@ -78,9 +80,9 @@ async def test_strides_with_and_without_feedback_are_told_apart(clinic: Clinic) 
     assert answer["reason"] is None
     assert (answer["parameter"], answer["unit"], answer["side"]) == ("stance_pct", "%", "left")
     rows = {r["kind"]: r for r in answer["rows"]}
-    counted = {kind: sum(c.why_not == kind for c in cues) for kind in ("baseline", "probe")}
-    assert rows["baseline"]["n"] == counted["baseline"] == 10
-    assert rows["probe"]["n"] == rows["without"]["n"] == counted["probe"]
+    by_kind = {kind: sum(c.why_not == kind for c in cues) for kind in ("baseline", "probe")}
+    assert rows["baseline"]["n"] == by_kind["baseline"] == 10
+    assert rows["probe"]["n"] == rows["without"]["n"] == by_kind["probe"]
     assert rows["with"]["n"] == sum(c.shown for c in cues)
     mean = sum(c.value - TOLD for c in cues if c.shown) / rows["with"]["n"]
     assert rows["with"]["mean"] == pytest.approx(mean), "the value of the analysis, not the one that was told"
@@ -105,19 +107,19 @@ async def test_strides_with_and_without_feedback_are_told_apart(clinic: Clinic) 
 async def test_an_edited_stride_leaves_the_sums_and_is_said(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     session, cues = await _train(clinic, patient, await _prescribe(clinic, patient), 0)
-    shown = next(c for c in cues if c.shown)
-    middle = 0.5 * (shown.start_s + shown.t_s)
+    visible_item = next(c for c in cues if c.shown)
+    middle = 0.5 * (visible_item.start_s + visible_item.t_s)
     edit = {"kind": "exclude_stride", "side": "left", "time_s": middle, "reason": "stumbled"}
     async with clinic.client("clinician") as client:
-        before = (await client.get(f"{API}/sessions/{session}/feedback")).json()
+        initial_body = (await client.get(f"{API}/sessions/{session}/feedback")).json()
         assert (await client.post(f"{API}/sessions/{session}/edits", json=edit)).status_code == 201
-        after = (await client.get(f"{API}/sessions/{session}/feedback")).json()
+        final_body = (await client.get(f"{API}/sessions/{session}/feedback")).json()
 
     def n(answer: dict[str, Any]) -> int:
         return next(int(r["n"]) for r in answer["rows"] if r["kind"] == "with")
 
-    assert n(after) == n(before) - 1
-    assert "1 cue was excluded because its stride is excluded from the analysis." in after["notes"]
+    assert n(final_body) == n(initial_body) - 1
+    assert "1 cue was excluded because its stride is excluded from the analysis." in final_body["notes"]
 
 
 @pytest.mark.slow
@@ -130,12 +132,12 @@ async def test_the_next_visit_is_held_against_the_end_of_the_last_training(clini
     async with clinic.client("viewer") as client:
         answer = (await client.get(f"{API}/sessions/{second}/feedback")).json()
         page = (await client.get(f"/sessions/{second}")).text
-    kept = answer["retention"]
-    assert (kept["session_id"], kept["performed_on"]) == (first, "2026-03-02")
-    assert (kept["now"]["n"], kept["end"]["n"]) == (5, 20)
-    assert kept["difference"] == pytest.approx(kept["now"]["mean"] - kept["end"]["mean"])
-    assert kept["limit"] == 4.2
-    assert "within the measurement error of 4.20" in kept["verdict"]
+    retained = answer["retention"]
+    assert (retained["session_id"], retained["performed_on"]) == (first, "2026-03-02")
+    assert (retained["now"]["n"], retained["end"]["n"]) == (5, 20)
+    assert retained["difference"] == pytest.approx(retained["now"]["mean"] - retained["end"]["mean"])
+    assert retained["limit"] == 4.2
+    assert "within the measurement error of 4.20" in retained["verdict"]
     assert "End of the last training" in page
 
 
@@ -168,14 +170,14 @@ async def test_a_take_that_is_not_the_analysed_recording_says_so(clinic: Clinic)
     patient = feedback.person(clinic)
     prescription = await _prescribe(clinic, patient)
     session, cues = await _train(clinic, patient, prescription, 0)
-    other = feedback.walked(clinic, patient, 1)
+    alternative = feedback.walked(clinic, patient, 1)
     with clinic.db.read() as c:
         recording = analyses.get_shown(c, session).recording_id
-    feedback.take(clinic, other, prescription, cues, recording)
+    feedback.take(clinic, alternative, prescription, cues, recording)
     waiting = feedback.visit(clinic, patient, 2)
     feedback.take(clinic, waiting, prescription, cues)
     async with clinic.client("viewer") as client:
-        wrong = (await client.get(f"{API}/sessions/{other}/feedback")).json()
+        wrong = (await client.get(f"{API}/sessions/{alternative}/feedback")).json()
         early = (await client.get(f"{API}/sessions/{waiting}/feedback")).json()
     assert "another recording" in wrong["reason"]
     assert "not analysed yet" in early["reason"]

@@ -1,4 +1,4 @@
-"""Whether the process lives and can work, said to whoever asks."""
+"""Health of the process and its components, without sign-in."""
 
 from __future__ import annotations
 
@@ -29,6 +29,6 @@ async def test_one_part_that_does_not_work_is_named_and_the_answer_is_503(clinic
     finally:
         state.readiness = usual
     assert (ready.status_code, ready.json()["status"]) == (503, "failing")
-    told = ready.json()["checks"]
-    assert (told.pop("worker"), set(told.values())) == ("No worker lives.", {"ok"})
+    body = ready.json()["checks"]
+    assert (body.pop("worker"), set(body.values())) == ("No worker lives.", {"ok"})
     assert live.status_code == 200

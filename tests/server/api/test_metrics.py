@@ -1,4 +1,4 @@
-"""Figures for Prometheus, who may read them, and the dashboard that shows them."""
+"""Prometheus metrics, their permissions, and the dashboard."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ CANARY = "Kanari-Vogel"
 
 @pytest.mark.slow
 async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -> None:
-    at = dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
-    good = Outcome(at, True, "x.tar", "", 5000)
+    timestamp = dt.datetime(2026, 3, 14, tzinfo=dt.UTC)
+    good = Outcome(timestamp, True, "x.tar", "", 5000)
     backup_schedule._write(clinic.settings, BackupState(good, good, good))
     async with clinic.client("admin") as admin:
-        made = await admin.post("/api/v1/patients", json={"code": CANARY})
+        response = await admin.post("/api/v1/patients", json={"code": CANARY})
         await admin.get(f"/api/v1/patients?search={CANARY}")
-        await admin.get(f"/api/v1/patients/{made.json()['id']}")
+        await admin.get(f"/api/v1/patients/{response.json()['id']}")
         await admin.get(f"/nowhere/{CANARY}")
         for method in ("MADEUP", "INVENTED"):
             await admin.request(method, "/metrics")
@@ -39,24 +39,24 @@ async def test_figures_of_requests_jobs_parts_disk_and_backups(clinic: Clinic) -
     async with clinic.client() as nobody, clinic.client("clinician") as clinician:
         assert (await nobody.get("/metrics")).status_code == 401
         assert (await clinician.get("/metrics")).status_code == 403
-    found = {
+    result = {
         (sample.name, *sorted(sample.labels.items())): sample.value
         for family in text_string_to_metric_families(text)
         for sample in family.samples
     }
     one = ("method", "GET"), ("route", "/api/v1/patients/{patient_id}"), ("status", "200")
-    assert found["sagittal_requests_total", *one] == 1
-    assert found["sagittal_requests_total", ("method", "GET"), ("route", "none"), ("status", "404")] == 1
-    other = ("method", "other"), ("route", "/metrics"), ("status", "405")
-    assert found["sagittal_requests_total", *other] == 2
-    assert found["sagittal_part_up", ("part", "database")] == 1
-    assert found["sagittal_jobs", ("state", "queued")] == 0
-    assert found["sagittal_backup_last_success_timestamp_seconds",] == at.timestamp()
-    assert found["sagittal_disk_free_bytes",] > 0
+    assert result["sagittal_requests_total", *one] == 1
+    assert result["sagittal_requests_total", ("method", "GET"), ("route", "none"), ("status", "404")] == 1
+    second = ("method", "other"), ("route", "/metrics"), ("status", "405")
+    assert result["sagittal_requests_total", *second] == 2
+    assert result["sagittal_part_up", ("part", "database")] == 1
+    assert result["sagittal_jobs", ("state", "queued")] == 0
+    assert result["sagittal_backup_last_success_timestamp_seconds",] == timestamp.timestamp()
+    assert result["sagittal_disk_free_bytes",] > 0
     assert CANARY not in text
-    assert made.json()["id"] not in text
+    assert response.json()["id"] not in text
     dashboard = json.loads((ROOT / "docs" / "how-to" / "grafana-dashboard.json").read_text())
-    asked = {t["expr"] for panel in dashboard["panels"] for t in panel["targets"]}
-    names = {name for expr in asked for name in re.findall(r"(?:sagittal|process)_\w+", expr)}
+    requested_exprs = {t["expr"] for panel in dashboard["panels"] for t in panel["targets"]}
+    names = {name for expr in requested_exprs for name in re.findall(r"(?:sagittal|process)_\w+", expr)}
     assert len(names) > 10
-    assert names <= {name for name, *_ in found}
+    assert names <= {name for name, *_ in result}

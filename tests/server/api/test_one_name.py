@@ -1,4 +1,4 @@
-"""One angle, one name: on every page, in every answer and file no title stands for two values."""
+"""Each angle has one title on all pages, responses and files."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ STANDING = {"hip_flexion_l": 12.0, "hip_flexion_r": 12.0, "knee_flexion_l": 6.0,
 
 def _visits(clinic: Clinic) -> tuple[str, str]:
     """An earlier visit without a goniometer, and one with."""
-    known = replace(walk.angles(), standing_deg=STANDING)
-    results = (analysed.files(), {**analysed.files(), "angles.parquet": angles_parquet(known)})
+    known_variant = replace(walk.angles(), standing_deg=STANDING)
+    results = (analysed.files(), {**analysed.files(), "angles.parquet": angles_parquet(known_variant)})
     with clinic.db.write() as c:
         patient = patients.create(c, None, code=f"N-{new_id()[:8]}", height_m=1.75, birth_year=1980).id
-        made = [sessions.create(c, None, patient, performed_on=dt.date(2026, 3, day)).id for day in (2, 30)]
-    for session, files in zip(made, results, strict=True):
+        ids = [sessions.create(c, None, patient, performed_on=dt.date(2026, 3, day)).id for day in (2, 30)]
+    for session, files in zip(ids, results, strict=True):
         analysed.finish(clinic, patient, session, files)
-    return made[0], made[1]
+    return ids[0], ids[1]
 
 
 def _texts(html: str, pattern: str) -> list[str]:
     return [
-        re.sub(r"<[^>]*>|&nbsp;|\s+", " ", found).strip() for found in re.findall(pattern, html, re.DOTALL)
+        re.sub(r"<[^>]*>|&nbsp;|\s+", " ", matche).strip() for matche in re.findall(pattern, html, re.DOTALL)
     ]
 
 
 def _rows(html: str) -> list[str]:
-    """First cells of the parameter tables, without the unit and what stands behind it."""
+    """First cells of the parameter tables, without units and details."""
     tables = re.findall(r'<table class="[^"]*params[^"]*">.*?</table>', html, re.DOTALL)
     return [t for table in tables for t in _texts(table, ROW)]
 
@@ -90,8 +90,8 @@ async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> Non
     first = next(
         r for r in curves if (r["variable"], r["side"], r["pct_cycle"]) == ("hip_flexion", "left", "0")
     )
-    for said in (hip["sides"]["left"]["mean_deg"][0], float(first["mean_deg"])):
-        assert said == pytest.approx(contact["left"]["value"], abs=0.01)
+    for message in (hip["sides"]["left"]["mean_deg"][0], float(first["mean_deg"])):
+        assert message == pytest.approx(contact["left"]["value"], abs=0.01)
     bare = [c for c in report["curves"] if c["zero"] != "anatomical"]
     assert bare
     assert all(c["norm"] is None for c in bare)

@@ -113,10 +113,12 @@ async def test_a_busy_database_is_said_and_not_an_internal_error(
 ) -> None:
     monkeypatch.setattr(sqlite_file, "BUSY_TIMEOUT_MS", 100)
     async with open_clinic(tmp_path) as clinic, clinic.client("clinician") as client:
-        with contextlib.closing(sqlite3.connect(clinic.settings.database, isolation_level=None)) as other:
-            other.execute("BEGIN IMMEDIATE")
+        with contextlib.closing(
+            sqlite3.connect(clinic.settings.database, isolation_level=None)
+        ) as other_connection:
+            other_connection.execute("BEGIN IMMEDIATE")
             answer = await client.post(f"{API}/patients", json={"code": "waits"})
-            other.execute("ROLLBACK")
+            other_connection.execute("ROLLBACK")
         assert (answer.status_code, answer.json()["code"]) == (503, "database_busy")
         assert answer.headers["retry-after"]
         assert (await client.post(f"{API}/patients", json={"code": "waits"})).status_code == 201
@@ -129,8 +131,8 @@ async def test_no_log_line_and_no_error_body_holds_what_was_entered_about_a_pati
     for name in ("httpx", "httpcore"):  # the client's own log is not the server's
         logging.getLogger(name).setLevel(logging.WARNING)
     async with clinic.client("clinician") as client:
-        made = await client.post(f"{API}/patients", json={"code": "canary", "note": CANARY})
-        patient = made.json()["id"]
+        response = await client.post(f"{API}/patients", json={"code": "canary", "note": CANARY})
+        patient = response.json()["id"]
         session = (await client.post(f"{API}/patients/{patient}/sessions", json={"title": CANARY})).json()[
             "id"
         ]

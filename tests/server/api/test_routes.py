@@ -32,9 +32,9 @@ def test_every_route_is_below_the_prefix_and_says_who_may(api: APIRouter) -> Non
 
 
 def test_what_stands_beside_the_api_is_no_part_of_it() -> None:
-    beside = {route for router in BESIDE for route in list_declared_actions(router.routes)}
-    assert {"GET /health/live", "GET /sign-in/{token}", "WEBSOCKET /sessions/{sid}/live/feed"} <= beside
-    assert not [route for route in beside if "/api" in route]
+    neighbour = {route for router in BESIDE for route in list_declared_actions(router.routes)}
+    assert {"GET /health/live", "GET /sign-in/{token}", "WEBSOCKET /sessions/{sid}/live/feed"} <= neighbour
+    assert not [route for route in neighbour if "/api" in route]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Whatever the OpenAPI document allows, and much of what it does not, gets an answer the document names."""
+"""Every request within the OpenAPI document, and many outside it, gets a documented response."""
 
 from __future__ import annotations
 

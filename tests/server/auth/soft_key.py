@@ -1,4 +1,4 @@
-"""A security key in software: it answers as one on the USB port does, and lies where a test wants it to."""
+"""Software security key that answers like a USB key."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ class SoftKey:
         public = cbor2.dumps({1: 2, 3: -7, -1: 1, **point})
         attested = bytes(16) + len(self.id).to_bytes(2, "big") + self.id + public
         data = self._data(host or options["rp"]["id"], PRESENT | ATTESTED) + attested
-        said = self._said("webauthn.create", options, origin)
-        made = cbor2.dumps({"fmt": "none", "attStmt": {}, "authData": data})
-        return self._answer({"clientDataJSON": b64(said), "attestationObject": b64(made)})
+        message = self._said("webauthn.create", options, origin)
+        dumps = cbor2.dumps({"fmt": "none", "attStmt": {}, "authData": data})
+        return self._answer({"clientDataJSON": b64(message), "attestationObject": b64(dumps)})
 
     def get(
         self, options: dict[str, Any], origin: str, *, host: str | None = None, flags: int = PRESENT
@@ -47,9 +47,9 @@ class SoftKey:
         """What navigator.credentials.get gives."""
         self.count += 1
         data = self._data(host or options["rpId"], flags)
-        said = self._said("webauthn.get", options, origin)
-        signature = self.private.sign(data + hashlib.sha256(said).digest(), ec.ECDSA(SHA256()))
-        parts = {"clientDataJSON": said, "authenticatorData": data, "signature": signature}
+        message = self._said("webauthn.get", options, origin)
+        signature = self.private.sign(data + hashlib.sha256(message).digest(), ec.ECDSA(SHA256()))
+        parts = {"clientDataJSON": message, "authenticatorData": data, "signature": signature}
         return self._answer({name: b64(part) for name, part in parts.items()})
 
     def _data(self, host: str, flags: int) -> bytes:

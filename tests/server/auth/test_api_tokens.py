@@ -26,8 +26,8 @@ async def make(clinic: Clinic, role: str, *scopes: str, days: int = 5) -> dict[s
         body = {"name": "Matlab", "scopes": scopes, "days": days, "password": PASSWORD}
         answer = await client.post(f"{API}/account/tokens", json=body)
         assert answer.status_code == 201, answer.text
-        made: dict[str, Any] = answer.json()
-        return made
+        fields: dict[str, Any] = answer.json()
+        return fields
 
 
 def bearer(clinic: Clinic, token: str) -> httpx.AsyncClient:
@@ -35,8 +35,8 @@ def bearer(clinic: Clinic, token: str) -> httpx.AsyncClient:
 
 
 async def test_a_token_does_what_its_scopes_and_its_person_may(clinic: Clinic) -> None:
-    made = await make(clinic, "clinician", "read")
-    async with bearer(clinic, made["token"]) as client:
+    recording = await make(clinic, "clinician", "read")
+    async with bearer(clinic, recording["token"]) as client:
         assert (await client.get(f"{API}/patients")).status_code == 200
         assert (await client.post(f"{API}/patients", json={"code": "TK-1"})).status_code == 403
         for path in ("/account", "/account/tokens", "/audit", "/users"):
@@ -44,9 +44,9 @@ async def test_a_token_does_what_its_scopes_and_its_person_may(clinic: Clinic) -
         # its door is the API: no page, no cookie, no address
         assert (await client.get("/patients", headers={"accept": "text/html"})).status_code == 303
     async with clinic.client() as client:
-        client.cookies.set("sid", made["token"])
+        client.cookies.set("sid", recording["token"])
         assert (await client.get(f"{API}/patients")).status_code == 401
-        assert (await client.get(f"{API}/patients?token={made['token']}")).status_code == 401
+        assert (await client.get(f"{API}/patients?token={recording['token']}")).status_code == 401
     writer = await make(clinic, "clinician", "write", "read")
     async with bearer(clinic, writer["token"]) as client:
         made_patient = await client.post(f"{API}/patients", json={"code": "TK-2"})
@@ -69,25 +69,26 @@ async def test_a_token_does_what_its_scopes_and_its_person_may(clinic: Clinic) -
 
 @sqlite_only
 async def test_a_token_is_stored_as_a_hash_and_ends(clinic: Clinic) -> None:
-    made = await make(clinic, "admin", "read")
-    assert re.fullmatch(r"sgt_[\w-]{43}", made["token"])
-    assert made["token"].encode() not in clinic.settings.database.read_bytes()
-    async with clinic.client("admin") as admin, bearer(clinic, made["token"]) as client:
+    recording = await make(clinic, "admin", "read")
+    assert re.fullmatch(r"sgt_[\w-]{43}", recording["token"])
+    assert recording["token"].encode() not in clinic.settings.database.read_bytes()
+    async with clinic.client("admin") as admin, bearer(clinic, recording["token"]) as client:
         assert (await client.get(f"{API}/patients")).status_code == 200
         assert (
-            made["token"] not in (await admin.get("/account")).text + (await admin.get(f"{API}/audit")).text
+            recording["token"]
+            not in (await admin.get("/account")).text + (await admin.get(f"{API}/audit")).text
         )
         listed = (await admin.get(f"{API}/account/tokens")).json()
         assert listed[0]["used_at"] is not None
         with clinic.db.write() as c:
             c.execute(update(api_token).values(expires_at=now() - dt.timedelta(seconds=1)))
         assert (await client.get(f"{API}/patients")).status_code == 401
-        other = await make(clinic, "admin", "read")
-        client.headers["authorization"] = f"Bearer {other['token']}"
+        other_recording = await make(clinic, "admin", "read")
+        client.headers["authorization"] = f"Bearer {other_recording['token']}"
         assert (await client.get(f"{API}/patients")).status_code == 200
-        assert (await admin.delete(f"{API}/account/tokens/{other['id']}")).status_code == 204
+        assert (await admin.delete(f"{API}/account/tokens/{other_recording['id']}")).status_code == 204
         assert (await client.get(f"{API}/patients")).status_code == 401
-        assert (await admin.delete(f"{API}/account/tokens/{other['id']}")).status_code == 404
+        assert (await admin.delete(f"{API}/account/tokens/{other_recording['id']}")).status_code == 404
         # a closed account has no working token
         closed = await make(clinic, "assistant", "read")
         client.headers["authorization"] = f"Bearer {closed['token']}"

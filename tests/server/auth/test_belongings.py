@@ -77,9 +77,11 @@ async def ward(
                 )
             )
             key = new_id()
-            kept = {"host": "localhost", "credential_id": b"1", "public_key": b"2", "sign_count": 0}
+            retained = {"host": "localhost", "credential_id": b"1", "public_key": b"2", "sign_count": 0}
             c.execute(
-                insert(security_key).values(id=key, user_id=owner, name="blue", created_at=LONG_AGO, **kept)
+                insert(security_key).values(
+                    id=key, user_id=owner, name="blue", created_at=LONG_AGO, **retained
+                )
             )
         of_owner = {"user_id": owner, "token_id": row.id, "key_id": key, "token": new_token()}
         one, two = (add_belongings(clinic, code) | OF_NOBODY | of_owner for code in ("Alder", "Birch"))
@@ -139,7 +141,7 @@ STRANGERS: dict[str, Callable[[Ward], dict[str, str]]] = {
 @pytest.mark.parametrize("who", STRANGERS)
 async def test_a_stranger_reaches_nothing_that_is_there(ward: Ward, who: str) -> None:
     headers = STRANGERS[who](ward)
-    before, wrong = ward.rows(), []
+    initial_rows, wrong = ward.rows(), []
     # one function says who asks: these walk all routes, the others two doors
     is_walked = who in {"no sign-in", "sign-in that is over", "token that is over"}
     doors = ("GET /api/v1/patients/{patient_id}", "WEBSOCKET /sessions/{sid}/replay")
@@ -151,28 +153,28 @@ async def test_a_stranger_reaches_nothing_that_is_there(ward: Ward, who: str) ->
         elif "Alder" in answer.text or "Birch" in answer.text:
             wrong.append((f"{route} tells {answer.text[:200]}", answer.status_code))
     assert wrong == []
-    assert ward.rows() == before
+    assert ward.rows() == initial_rows
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("role", Role)
 async def test_a_role_reads_and_changes_nothing_it_may_not(ward: Ward, role: Role) -> None:
     headers = {"Cookie": f"sid={ward.clinic.token(role)}"}
-    before, wrong = ward.rows(), []
+    initial_rows, wrong = ward.rows(), []
     for route, action in ward.actions.items():
         if action not in PUBLIC and role not in POLICY[action]:
             answer = await ward.ask(route, ward.one, **headers)
             if answer.status_code != 403 or "Alder" in answer.text:
                 wrong.append((route, answer.status_code))
     assert wrong == []
-    assert ward.rows() == before
+    assert ward.rows() == initial_rows
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scope", Scope)
 async def test_a_token_does_nothing_beyond_its_scope(ward: Ward, scope: Scope) -> None:
     headers = _token(ward, "admin", [scope], used_at=dt.datetime.now(dt.UTC))
-    before, wrong = ward.rows(), []
+    initial_rows, wrong = ward.rows(), []
     for route, action in ward.actions.items():
         if action in PUBLIC or action in SCOPES[scope]:
             continue
@@ -181,7 +183,7 @@ async def test_a_token_does_nothing_beyond_its_scope(ward: Ward, scope: Scope) -
         if answer.status_code != (403 if by_its_door else 401):
             wrong.append((route, answer.status_code))
     assert wrong == []
-    assert ward.rows() == before
+    assert ward.rows() == initial_rows
 
 
 async def test_what_belongs_to_one_visit_is_not_reached_through_another(ward: Ward) -> None:
@@ -193,7 +195,7 @@ async def test_what_belongs_to_one_visit_is_not_reached_through_another(ward: Wa
         if any(f"{{{n}}}" in r for n in ("upload_id", "other_id", "other"))
     ]
     assert len(crossed) > 5
-    before, wrong = ward.rows(), []
+    initial_rows, wrong = ward.rows(), []
     for route, names in crossed:
         answer = await ward.ask(route, {**ward.one, **{n: ward.two[n] for n in names}}, **headers)
         if answer.status_code not in {404, 409, 422} or "Birch" in answer.text:
@@ -210,15 +212,15 @@ async def test_what_belongs_to_one_visit_is_not_reached_through_another(ward: Wa
         answer = await client.post(f"/api/v1/patients/{ward.one['pid']}/sessions", json=body)
     assert answer.status_code == 409, answer.text
     assert wrong == []
-    assert ward.rows() == before
+    assert ward.rows() == initial_rows
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("role", Role)
 async def test_nobody_touches_what_opens_the_account_of_another(ward: Ward, role: Role) -> None:
-    """Tokens and second factors: only an administrator may take a factor away, and nobody a token."""
+    """Only administrators may remove another account's second factor; nobody sees its tokens."""
     async with ward.clinic.client(role) as client:
-        before = ward.rows()
+        initial_rows = ward.rows()
         listed = await client.get("/api/v1/account/tokens")
         assert ward.one["token_id"] not in listed.text
         revoked = await client.delete(f"/api/v1/account/tokens/{ward.one['token_id']}")
@@ -229,24 +231,24 @@ async def test_nobody_touches_what_opens_the_account_of_another(ward: Ward, role
         forgotten = await client.post(f"{keys}/{ward.one['key_id']}/remove", json=proofs)
         assert forgotten.status_code == 404
         if role is not Role.ADMIN:
-            taken = await client.delete(f"/api/v1/users/{ward.one['user_id']}/second-factor")
-            assert taken.status_code == 403
-    assert ward.rows() == before
+            response = await client.delete(f"/api/v1/users/{ward.one['user_id']}/second-factor")
+            assert response.status_code == 403
+    assert ward.rows() == initial_rows
 
 
 @pytest.mark.parametrize("headers", [{}, {"Authorization": "Bearer x"}, {"Authorization": "Bearer "}])
 async def test_a_take_is_filmed_by_its_own_tablet_only(ward: Ward, headers: dict[str, str]) -> None:
     own = {"Authorization": f"Bearer {ward.two['link_id']}"}
-    before, wrong = ward.rows(), []
+    initial_rows, wrong = ward.rows(), []
     films = [r for r in ward.actions if "{take_id}" in r]
     assert films
     for route in films:
-        for said in (headers, own):  # none, and that of the other patient's take
-            answer = await ward.ask(route, ward.one, **said)
+        for message in (headers, own):  # none, and that of the other patient's take
+            answer = await ward.ask(route, ward.one, **message)
             if answer.status_code not in {401, 403, 404, 422}:
                 wrong.append((route, answer.status_code))
     assert wrong == []
-    assert ward.rows() == before
+    assert ward.rows() == initial_rows
 
 
 LISTS = (
@@ -270,7 +272,7 @@ async def join(ward: Ward, patient: Mapping[str, str], *users: str) -> None:
 
 @pytest.fixture
 async def guarded(ward: Ward) -> AsyncIterator[Ward]:
-    """The ward with care teams: of Birch everybody, of Alder nobody."""
+    """Ward with care teams: all accounts in Birch, none in Alder."""
     await join(ward, ward.two, "clinician", "assistant", "viewer")
     await teams(ward, on=True)
     yield ward
@@ -279,7 +281,7 @@ async def guarded(ward: Ward) -> AsyncIterator[Ward]:
 
 
 def with_owner(ward: Ward) -> list[str]:
-    """Routes whose address names something of a patient, as this test made it, whatever the rule says."""
+    """Routes whose address contains a patient's object, found independently of the access rule."""
     names = ward.one.keys() - OF_NOBODY.keys() - {"user_id", "token_id", "key_id", "token"}
     return [r for r in ward.actions if any(f"{{{name}}}" in r for name in names)]
 
@@ -292,7 +294,7 @@ async def test_outside_the_care_team_nothing_of_a_patient_is_seen_or_changed(
     headers = {"Cookie": f"sid={guarded.clinic.token(role)}"}
     routes = [r for r in with_owner(guarded) if (a := guarded.actions[r]) not in PUBLIC and role in POLICY[a]]
     assert len(routes) > 15
-    before, wrong = guarded.rows(), []
+    initial_rows, wrong = guarded.rows(), []
     for route in routes:
         answer = await guarded.ask(route, guarded.one, **headers)
         nobody = dict.fromkeys(guarded.one, "0" * 32) | OF_NOBODY
@@ -300,7 +302,7 @@ async def test_outside_the_care_team_nothing_of_a_patient_is_seen_or_changed(
         if (answer.status_code, answer.text) != (404, unknown.text) or "Alder" in answer.text:
             wrong.append((route, answer.status_code))
     assert wrong == []
-    assert guarded.rows() == before
+    assert guarded.rows() == initial_rows
 
 
 @pytest.mark.slow
@@ -309,15 +311,17 @@ async def test_no_list_shows_a_patient_of_another_team(guarded: Ward, role: Role
     lists = {
         f"GET {path}" for path in (p.partition("?")[0] for p in LISTS)
     }  # every page and answer that names nothing of a patient is among them, or names nobody
-    others = {r for r in guarded.actions if r.startswith("GET") and "{" not in r} - lists - NAMES_NOBODY
-    assert others == set(), "say whether these lists show patients"
+    remaining = {r for r in guarded.actions if r.startswith("GET") and "{" not in r} - lists - NAMES_NOBODY
+    assert remaining == set(), "say whether these lists show patients"
     async with guarded.clinic.client(role) as client:
         for path in LISTS:
             answer = await client.get(path)
             assert answer.status_code in {200, 403}, path
             assert guarded.one["pid"] not in answer.text, path
-            shown = answer.text.replace("q=Alder", "").replace('value="Alder"', "").replace("“Alder”", "")
-            assert "Alder" not in shown, path
+            visible_variant = (
+                answer.text.replace("q=Alder", "").replace('value="Alder"', "").replace("“Alder”", "")
+            )
+            assert "Alder" not in visible_variant, path
         for path in ("/patients", "/api/v1/patients", "/jobs", "/api/v1/jobs"):
             assert "Birch" in (await client.get(path)).text, path
         assert " 1 of 1" in " ".join((await client.get("/patients")).text.split())
@@ -346,9 +350,9 @@ async def test_a_member_and_an_administrator_see_the_patient(guarded: Ward) -> N
             assert (await client.get(f"/patients/{guarded.one['pid']}")).status_code == 200
             assert (await client.get(f"/api/v1/jobs/{guarded.one['job_id']}")).status_code == 200
     async with guarded.clinic.client("viewer") as client:
-        here = f"/api/v1/patients/{guarded.one['pid']}/care-team"
-        assert [m["name"] for m in (await client.get(here)).json()["members"]] == ["viewer"]
-        assert (await client.put(here, json={"users": []})).status_code == 403
+        address = f"/api/v1/patients/{guarded.one['pid']}/care-team"
+        assert [m["name"] for m in (await client.get(address)).json()["members"]] == ["viewer"]
+        assert (await client.put(address, json={"users": []})).status_code == 403
         assert (await client.put("/api/v1/care-teams", json={"on": False})).status_code == 403
     await join(guarded, guarded.one)
     async with guarded.clinic.client("viewer") as client:
@@ -357,31 +361,31 @@ async def test_a_member_and_an_administrator_see_the_patient(guarded: Ward) -> N
 
 async def test_who_adds_a_patient_is_in_the_team(guarded: Ward) -> None:
     async with guarded.clinic.client("clinician") as client:
-        made = (await client.post("/api/v1/patients", json={"code": "Cedar"})).json()["id"]
-        assert (await client.get(f"/api/v1/patients/{made}")).status_code == 200
+        body = (await client.post("/api/v1/patients", json={"code": "Cedar"})).json()["id"]
+        assert (await client.get(f"/api/v1/patients/{body}")).status_code == 200
     async with guarded.clinic.client("viewer") as client:
-        assert (await client.get(f"/api/v1/patients/{made}")).status_code == 404
+        assert (await client.get(f"/api/v1/patients/{body}")).status_code == 404
 
 
 async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_sees_it(guarded: Ward) -> None:
-    here, door = f"/api/v1/patients/{guarded.one['pid']}", "/api/v1/emergency-accesses"
-    why = {"code": "Alder", "reason": "Fell in the corridor, Dr Elm asks for the last walk."}
+    address, door = f"/api/v1/patients/{guarded.one['pid']}", "/api/v1/emergency-accesses"
+    reason = {"code": "Alder", "reason": "Fell in the corridor, Dr Elm asks for the last walk."}
     async with guarded.clinic.client("viewer") as client:
-        assert (await client.post(door, json=why)).status_code == 403
+        assert (await client.post(door, json=reason)).status_code == 403
     token = _token(guarded, "clinician", list(Scope))
     async with guarded.clinic.client(headers=token) as client:
-        assert (await client.post(door, json=why)).status_code == 403  # a program is in no emergency
+        assert (await client.post(door, json=reason)).status_code == 403  # a program is in no emergency
     async with guarded.clinic.client("clinician") as client:
-        assert (await client.get(here)).status_code == 404
-        assert (await client.post(door, json=why | {"reason": "     urgent        "})).status_code == 422
-        assert (await client.post(door, json=why | {"code": "alder"})).status_code == 404
-        assert (await client.get(here)).status_code == 404
-        opened = await client.post(door, json=why)
+        assert (await client.get(address)).status_code == 404
+        assert (await client.post(door, json=reason | {"reason": "     urgent        "})).status_code == 422
+        assert (await client.post(door, json=reason | {"code": "alder"})).status_code == 404
+        assert (await client.get(address)).status_code == 404
+        opened = await client.post(door, json=reason)
         assert opened.status_code == 201, opened.text
-        assert (await client.get(here)).status_code == 200
+        assert (await client.get(address)).status_code == 200
         assert "Alder" in (await client.get("/patients")).text
-        assert (await client.post(door, json=why)).json()["code"] == "seen_already"
-        assert (await client.post(door, json=why | {"code": "Birch"})).json()["code"] == "seen_already"
+        assert (await client.post(door, json=reason)).json()["code"] == "seen_already"
+        assert (await client.post(door, json=reason | {"code": "Birch"})).json()["code"] == "seen_already"
     async with guarded.clinic.client("admin") as client:
         assert "Dr Elm" in (await client.get(f"/patients/{guarded.one['pid']}")).text
         log = (await client.get("/audit")).text
@@ -394,7 +398,7 @@ async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_s
         long = {"opened_at": LONG_AGO, "ends_at": dt.datetime.now(dt.UTC)}
         c.execute(update(emergency_access).values(**long))
     async with guarded.clinic.client("clinician") as client:
-        assert (await client.get(here)).status_code == 404
+        assert (await client.get(address)).status_code == 404
         assert "Alder" not in (await client.get("/patients")).text
 
 
@@ -427,7 +431,7 @@ async def test_an_open_line_outlasts_a_database_that_is_away(monkeypatch: pytest
 
 async def test_guessing_codes_ends(guarded: Ward) -> None:
     async with guarded.clinic.client("clinician") as client:
-        said = [
+        status_codes = [
             (
                 await client.post(
                     "/api/v1/emergency-accesses", json={"code": f"P-{i}", "reason": "I am just looking."}
@@ -435,4 +439,4 @@ async def test_guessing_codes_ends(guarded: Ward) -> None:
             ).status_code
             for i in range(MAX_PER_PAIR + 1)
         ]
-    assert (said[0], said[-1], set(said)) == (404, 429, {404, 429})
+    assert (status_codes[0], status_codes[-1], set(status_codes)) == (404, 429, {404, 429})

@@ -32,13 +32,13 @@ async def test_the_cookie_is_secure_and_bound_to_the_host_behind_tls(tmp_path: P
 async def test_on_loopback_the_cookie_has_its_plain_name_and_is_taken_back_alike(clinic: Clinic) -> None:
     clinic.user("viewer")
     async with clinic.client() as client:
-        given = await client.post("/api/v1/sign-in", json={"name": "viewer", "password": PASSWORD})
-        token = given.cookies["sid"]
-        assert given.headers["set-cookie"] == f"sid={token}; HttpOnly; Path=/; SameSite=lax"
-        away = await client.post("/api/v1/sign-out")
-    taken = away.headers["set-cookie"]
-    assert taken.startswith('sid=""; ')
-    assert {"Max-Age=0", "HttpOnly", "Path=/", "SameSite=lax"} <= set(taken.split("; "))
+        post = await client.post("/api/v1/sign-in", json={"name": "viewer", "password": PASSWORD})
+        token = post.cookies["sid"]
+        assert post.headers["set-cookie"] == f"sid={token}; HttpOnly; Path=/; SameSite=lax"
+        response = await client.post("/api/v1/sign-out")
+    headers = response.headers["set-cookie"]
+    assert headers.startswith('sid=""; ')
+    assert {"Max-Age=0", "HttpOnly", "Path=/", "SameSite=lax"} <= set(headers.split("; "))
     # the name for TLS is no way in here
     async with clinic.client(headers={"Cookie": f"__Host-sid={clinic.token('viewer')}"}) as client:
         assert (await client.get("/api/v1/account")).status_code == 401

@@ -1,4 +1,4 @@
-"""A code beside the password: asked for, taken once, limited, and a way back for who loses the telephone."""
+"""Second factor: required, single use, rate limit, recovery without the phone."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ class At:
 
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> At:
-    made = At()
-    monkeypatch.setattr(second_factor, "time", made)
-    return made
+    result = At()
+    monkeypatch.setattr(second_factor, "time", result)
+    return result
 
 
 async def enrol(clinic: Clinic, client: httpx.AsyncClient, clock: At) -> tuple[pyotp.TOTP, list[str]]:
@@ -63,8 +63,8 @@ async def test_signing_in_needs_a_code_that_works_once(clinic: Clinic, clock: At
         assert len(set(codes)) == 10
         assert "A code is asked for" in (await client.get("/account")).text
         # no second one over it
-        again = await client.post(f"{API}/account/second-factor", json={"password": PASSWORD})
-        assert again.status_code == 409
+        second_response = await client.post(f"{API}/account/second-factor", json={"password": PASSWORD})
+        assert second_response.status_code == 409
     with clinic.db.read() as c:
         stored = c.execute(select(table).join(user).where(user.c.name == "clinician")).one()
     assert totp.secret.encode() not in stored.secret
@@ -133,15 +133,15 @@ async def test_a_missing_key_beside_secrets_is_an_error_and_never_a_new_key(
     begin = f"{API}/account/second-factor"
     with clinic.db.write() as c:
         c.execute(table.delete())
-    async with clinic.client("viewer") as client, clinic.client("assistant") as other:
+    async with clinic.client("viewer") as client, clinic.client("assistant") as other_client:
         totp, codes = await enrol(clinic, client, clock)
         key = clinic.settings.second_factor_key
-        kept = key.read_bytes()
+        stored_content = key.read_bytes()
         key.unlink()
         clock.s += 30
         for answer in (
             await sign_in(clinic, "viewer", totp.at(clock.s)),
-            await other.post(begin, json={"password": PASSWORD}),
+            await other_client.post(begin, json={"password": PASSWORD}),
         ):
             assert (answer.status_code, answer.json()["code"]) == (503, "second_factor_key_unusable")
             assert str(key) not in answer.text
@@ -152,7 +152,7 @@ async def test_a_missing_key_beside_secrets_is_an_error_and_never_a_new_key(
         assert (await sign_in(clinic, "viewer", totp.at(clock.s))).status_code == 503
         with clinic.db.read() as c:
             assert len(second_factor.find_problems(c, key)) == 1
-        key.write_bytes(kept)
+        key.write_bytes(stored_content)
         with clinic.db.read() as c:
             assert second_factor.find_problems(c, key) == []
         assert (await sign_in(clinic, "viewer", totp.at(clock.s))).status_code == 200
@@ -160,6 +160,6 @@ async def test_a_missing_key_beside_secrets_is_an_error_and_never_a_new_key(
         with clinic.db.write() as c:
             second_factor.remove(c, clinic.user("viewer"))
         assert (
-            await other.post(begin, json={"password": PASSWORD})
+            await other_client.post(begin, json={"password": PASSWORD})
         ).status_code == 200  # nobody needs the old one
         assert key.exists()

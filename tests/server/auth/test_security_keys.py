@@ -1,4 +1,4 @@
-"""A security key beside the password, and what an intruder would try with one."""
+"""Security keys with a password, and attacks on them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ async def person(clinic: Clinic) -> AsyncIterator[tuple[httpx.AsyncClient, list[
     key = clinic.settings.second_factor_key
     with clinic.db.write() as c:
         second_factor.remove(c, user_id)
-        made = second_factor.begin(c, key, user_id, "clinician")
-        codes = second_factor.confirm(c, key, user_id, pyotp.TOTP(made.secret).now())
+        session = second_factor.begin(c, key, user_id, "clinician")
+        codes = second_factor.confirm(c, key, user_id, pyotp.TOTP(session.secret).now())
     cookie = {"Cookie": f"sid={clinic.token('clinician')}"}
     async with clinic.client(headers=cookie) as client:
         client.base_url = httpx.URL(HERE)
@@ -46,9 +46,9 @@ async def ask(client: httpx.AsyncClient, codes: list[str]) -> dict[str, Any]:
     return options
 
 
-async def set_up(client: httpx.AsyncClient, codes: list[str], at: str = HERE) -> SoftKey:
+async def set_up(client: httpx.AsyncClient, codes: list[str], position: str = HERE) -> SoftKey:
     key = SoftKey()
-    body = {"name": "blue", "key": key.create(await ask(client, codes), at)}
+    body = {"name": "blue", "key": key.create(await ask(client, codes), position)}
     answer = await client.post(f"{API}/account/security-keys", json=body)
     assert answer.status_code == 201, answer.text
     return key
@@ -86,8 +86,8 @@ async def test_a_key_takes_the_place_of_the_code(
     assert "blue" in (await client.get("/account")).text
     path = f"{API}/account/security-keys/{listed['id']}/remove"
     proofs = {"password": PASSWORD, "code": codes.pop()}
-    async with clinic.client("viewer") as other:
-        assert (await other.post(path, json=proofs)).status_code == 404
+    async with clinic.client("viewer") as other_client:
+        assert (await other_client.post(path, json=proofs)).status_code == 404
     assert (await client.post(path, json=proofs | {"password": "wrong"})).status_code == 403
     assert (await client.post(path, json=proofs)).status_code == 204
     assert (await challenge(clinic)).status_code == 404
@@ -156,25 +156,25 @@ async def test_another_service_on_this_host_gets_nothing_it_can_use(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
     client, codes = person
-    key, there = await set_up(client, codes), "http://localhost:8443"
-    for asked, sent in ((HERE, there), (HERE, HERE)):
-        answer = key.get((await challenge(clinic, at=asked)).json()["options"], there)
+    key, target = await set_up(client, codes), "http://localhost:8443"
+    for requests, sent in ((HERE, target), (HERE, HERE)):
+        answer = key.get((await challenge(clinic, at=requests)).json()["options"], target)
         got = await sign_in(clinic, answer, at=sent)
-        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (asked, sent)
-    assert (await challenge(clinic, at=there)).status_code == 404
+        assert (got.status_code, got.json()["code"]) == (401, "key_refused"), (requests, sent)
+    assert (await challenge(clinic, at=target)).status_code == 404
     # a key set up at that port signs in there, and there alone
-    client.base_url = httpx.URL(there)
-    other = await set_up(client, codes, there)
+    client.base_url = httpx.URL(target)
+    second = await set_up(client, codes, target)
     assert [k["host"] for k in (await client.get(f"{API}/account/security-keys")).json()] == [
         "localhost",
         "localhost:8443",
     ]
-    options = (await challenge(clinic, at=there)).json()["options"]
+    options = (await challenge(clinic, at=target)).json()["options"]
     assert options["rpId"] == "localhost"
     assert len(options["allowCredentials"]) == 1
-    assert (await sign_in(clinic, other.get(options, there), at=there)).status_code == 200
+    assert (await sign_in(clinic, second.get(options, target), at=target)).status_code == 200
     options = (await challenge(clinic)).json()["options"]
-    assert (await sign_in(clinic, other.get(options, HERE))).status_code == 401
+    assert (await sign_in(clinic, second.get(options, HERE))).status_code == 401
     # a port nobody could keep is no place for keys
     client.base_url = httpx.URL(HERE)
     far = {"Host": f"localhost:{'1' * 300}"}
@@ -237,11 +237,11 @@ async def test_keys_of_another_port_do_not_make_keys_alone(
     clinic: Clinic, person: tuple[httpx.AsyncClient, list[str]]
 ) -> None:
     client, codes = person
-    choose, keys, there = (
+    choose, keys, target = (
         f"{API}/account/second-factor/keys-only", f"{API}/account/security-keys", "http://localhost:8443"
     )  # fmt: skip
-    client.base_url = httpx.URL(there)
-    await set_up(client, codes, there)
+    client.base_url = httpx.URL(target)
+    await set_up(client, codes, target)
     client.base_url = httpx.URL(HERE)
     on: dict[str, Any] = {"on": True, "password": PASSWORD}
     refused = await client.put(choose, json=on | {"code": codes[-1]})
@@ -318,15 +318,15 @@ async def test_a_key_is_set_up_once_for_one_account_and_one_name(
     assert [row["user_name"] for row in tries] == ["clinician"] * 5
     # a challenge that was answered wrongly is spent
     options = await ask(client, codes)
-    for at in ("http://evil.example", HERE):
-        body = {"name": "x", "key": SoftKey().create(options, at)}
-        assert (await client.post(add, json=body)).json()["code"] == "key_refused", at
+    for moment in ("http://evil.example", HERE):
+        body = {"name": "x", "key": SoftKey().create(options, moment)}
+        assert (await client.post(add, json=body)).json()["code"] == "key_refused", moment
     client.base_url = httpx.URL("http://127.0.0.1")
     proofs = {"password": PASSWORD, "code": codes.pop()}
     refused = await client.post(f"{add}/options", json=proofs)
     assert refused.json()["code"] == "no_keys_here"
     assert (await challenge(clinic, at="http://127.0.0.1")).status_code == 404
-    async with clinic.client("viewer") as other:
-        other.base_url = httpx.URL(HERE)
-        refused = await other.post(f"{add}/options", json=proofs)
+    async with clinic.client("viewer") as other_client:
+        other_client.base_url = httpx.URL(HERE)
+        refused = await other_client.post(f"{add}/options", json=proofs)
         assert refused.status_code in {401, 409}

@@ -79,9 +79,9 @@ async def test_asking_how_long_a_sign_in_lasts_does_not_prolong_it(clinic: Clini
     assert logins.look(token) is None
     assert logins.seconds_left(identity.login_id) == 0.0
     async with clinic.client("viewer") as client:
-        found = (await client.get("/api/v1/sign-in")).json()
-        assert found["name"] == "viewer"
-        assert 0 < found["left_s"] <= IDLE.total_seconds()
+        body = (await client.get("/api/v1/sign-in")).json()
+        assert body["name"] == "viewer"
+        assert 0 < body["left_s"] <= IDLE.total_seconds()
 
 
 async def test_activity_is_written_at_most_every_half_minute(clinic: Clinic) -> None:
@@ -92,13 +92,13 @@ async def test_activity_is_written_at_most_every_half_minute(clinic: Clinic) -> 
         with db.read() as c:
             return sorted(c.execute(select(login_session.c.last_seen_at)).scalars())
 
-    before = seen(clinic.db)
+    initial = seen(clinic.db)
     clock.passes(seconds=29)
     logins.find(token)
-    assert seen(clinic.db) == before
+    assert seen(clinic.db) == initial
     clock.passes(seconds=2)
     logins.find(token)
-    assert seen(clinic.db) != before
+    assert seen(clinic.db) != initial
 
 
 async def test_the_database_never_holds_the_token(clinic: Clinic) -> None:
@@ -112,7 +112,7 @@ async def test_the_database_never_holds_the_token(clinic: Clinic) -> None:
 
 
 async def test_a_planted_session_does_not_survive_the_sign_in(clinic: Clinic) -> None:
-    """Session fixation: what the browser came with is never what it leaves with."""
+    """Session fixation: sign-in replaces the browser's session."""
     clinic.user("viewer")
     attacker = clinic.token("viewer")
     for planted in ("a-value-the-attacker-chose", attacker):
@@ -143,11 +143,11 @@ def test_a_sign_in_is_read_while_another_program_holds_the_database(
     monkeypatch.setattr(sqlite_file, "BUSY_TIMEOUT_MS", 1)
     write_database(tmp_path / "a.db")
     clock = Clock()
-    with closing(Database(tmp_path / "a.db")) as db, closing(Database(tmp_path / "a.db")) as other:
+    with closing(Database(tmp_path / "a.db")) as db, closing(Database(tmp_path / "a.db")) as other_connection:
         logins = Logins(db, IDLE, ABSOLUTE, clock)
         with db.write() as c:
             token = logins.start(c, accounts.create(c, "anna", None, Role.VIEWER, "x").id, None)
-        with other.write():
+        with other_connection.write():
             for _ in range(3):
                 clock.now += IDLE * 0.9  # activity keeps it open though none can be written
                 assert logins.find(token) is not None

@@ -1,4 +1,4 @@
-"""Who may open which patient: the rule by itself, asked of the database."""
+"""Patient access rule, evaluated in the database."""
 
 from __future__ import annotations
 
@@ -37,11 +37,12 @@ async def test_outside_the_team_nothing_is_seen_but_in_an_emergency(clinic: Clin
     def seen() -> list[tuple[bool, bool]]:
         with clinic.db.read() as c:
             listed = [
-                one in c.execute(sight.only_seen(select(patient.c.id), who)).scalars().all()
-                for who in everybody
+                one in c.execute(sight.only_seen(select(patient.c.id), user)).scalars().all()
+                for user in everybody
             ]
             return [
-                (sight.may_open(c, who, parts), there) for who, there in zip(everybody, listed, strict=True)
+                (sight.may_open(c, user, parts), target)
+                for user, target in zip(everybody, listed, strict=True)
             ]
 
     assert seen() == [(True, True)] * 3, "without care teams everybody sees everybody"
@@ -60,10 +61,10 @@ async def test_outside_the_team_nothing_is_seen_but_in_an_emergency(clinic: Clin
         access = care_teams.open_in_emergency(c, locum, "SG-1", "Fell in the corridor.")
     assert seen() == [(True, True)] * 3
     with clinic.db.read() as c:
-        found = sight.find_emergency(c, locum, one)
-        assert found is not None
-        assert found.id == access.id
-        assert [sight.find_emergency(c, who, one) for who in (member, admin, None)] == [None] * 3
+        emergency = sight.find_emergency(c, locum, one)
+        assert emergency is not None
+        assert emergency.id == access.id
+        assert [sight.find_emergency(c, user, one) for user in (member, admin, None)] == [None] * 3
     with clinic.db.write() as c:
         over = now() - dt.timedelta(seconds=1)
         c.execute(update(emergency_access).values(opened_at=over - dt.timedelta(hours=1), ends_at=over))

@@ -1,4 +1,4 @@
-"""What a patient agreed to: nothing is overwritten, one of each purpose holds, all goes with the patient."""
+"""Consents: immutable, one valid per purpose, deleted with the patient."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def test_consent_is_given_withdrawn_given_anew_and_erased_with_the_patient(tmp_p
         assert consents.withdraw(c, None, first.id).withdrawn_on == now().date()
         with pytest.raises(Conflict):
             consents.withdraw(c, None, first.id)
-        again = consents.give(c, None, pid, purpose="research", evidence="form 14")
-        kept = consents.of_patient(c, pid)
-        assert {one.id for one in kept[:2]} >= {again.id}
-        assert (kept[-1].id, len(kept)) == (first.id, 3)
+        second = consents.give(c, None, pid, purpose="research", evidence="form 14")
+        retained = consents.of_patient(c, pid)
+        assert {one.id for one in retained[:2]} >= {second.id}
+        assert (retained[-1].id, len(retained)) == (first.id, 3)
         for wrong in (
             {"purpose": "fun"},
             {"evidence": " "},

@@ -46,8 +46,8 @@ def check(device_id: str, bias_dps: float = 0.0) -> DeviceCheck:
 def visit(clinic: Clinic, *, code: str = CODE, days_ago: int = 0) -> str:
     """A session with a file; its id."""
     with clinic.db.write() as c:
-        known = {p.code: p.id for p in patients.list_patients(c, None)}
-        pid = known.get(code) or patients.create(c, None, code=code).id
+        known_by_code = {p.code: p.id for p in patients.list_patients(c, None)}
+        pid = known_by_code.get(code) or patients.create(c, None, code=code).id
         sid = sessions.create(c, None, pid, performed_on=TODAY - dt.timedelta(days=days_ago)).id
     state = clinic.app.state
     with receiving.receive(clinic.db, state.blobs, clinic.settings, None, sid, "walk.txt") as upload:
@@ -57,15 +57,15 @@ def visit(clinic: Clinic, *, code: str = CODE, days_ago: int = 0) -> str:
 
 
 def publish(
-    clinic: Clinic, sid: str, worn: Mapping[str, str], *, exchanged: bool = False, bias_dps: float = 0.0
+    clinic: Clinic, sid: str, segments: Mapping[str, str], *, exchanged: bool = False, bias_dps: float = 0.0
 ) -> None:
-    """Do what the publishing of an analysis does for its devices."""
-    found = [
+    """Publish an analysis's device checks."""
+    result = [
         {**check(d, bias_dps).to_json(), "segment": segment, "exchanged": exchanged}
-        for d, segment in worn.items()
+        for d, segment in segments.items()
     ]
     with clinic.db.write() as c:
-        devices.keep_checks(c, recordings.require_current(c, sid).id, found)
+        devices.keep_checks(c, recordings.require_current(c, sid).id, result)
 
 
 def places(clinic: Clinic, *ids: str, but: str | None = None) -> dict[str, str]:
@@ -96,18 +96,18 @@ async def test_a_bias_that_moved_is_said_in_page_and_api_and_nobody_is_named(cli
         unknown = await client.get("/sensors/00B4FFFF")
     assert [a.status_code for a in answers] == [200] * 5
     assert unknown.status_code == 404
-    page, one, listed, told, table = answers
+    page, one, listed, notices, table = answers
     assert "Bias moved by 1.1 °/s" in page.text
     assert "Let it warm up" in page.text
     assert "First check" in page.text
     assert one.text.count("<svg") >= 4
     assert [d["device_id"] for d in listed.json()] == [RIGHT, LEFT]
-    assert (told.json()["state"], told.json()["takes"], told.json()["last_segment"]) == (
+    assert (notices.json()["state"], notices.json()["takes"], notices.json()["last_segment"]) == (
         "changed",
         3,
         "foot_l",
     )
-    assert [round(k["gyro_bias_rad_s"][1], 3) for k in told.json()["checks"]] == [0.002, 0.0, 0.021]
+    assert [round(k["gyro_bias_rad_s"][1], 3) for k in notices.json()["checks"]] == [0.002, 0.0, 0.021]
     assert table.text.count("\n") == 5
     with clinic.db.read() as c:
         (person,) = patients.list_patients(c, None)
@@ -145,9 +145,9 @@ async def test_another_analysis_of_a_session_takes_the_place_of_the_first(clinic
 
 @pytest.mark.parametrize("whole", [False, True])
 async def test_what_a_take_said_of_sensors_goes_with_it(clinic: Clinic, whole: bool) -> None:
-    sid, kept = visit(clinic), visit(clinic, code="ANOTHER", days_ago=9)
+    sid, retained = visit(clinic), visit(clinic, code="ANOTHER", days_ago=9)
     publish(clinic, sid, {LEFT: "foot_l"})
-    publish(clinic, kept, {RIGHT: "foot_r"})
+    publish(clinic, retained, {RIGHT: "foot_r"})
     reviewed = clinic.app.state.reviewed
     with clinic.db.read() as c:
         pid = sessions.get(c, sid).patient_id
@@ -163,13 +163,13 @@ async def test_the_upload_page_and_the_tablet_offer_the_places_of_another_patien
 ) -> None:
     publish(clinic, visit(clinic, days_ago=2), {LEFT: "foot_l", RIGHT: "foot_r"})
     sid = visit(clinic, code="ANOTHER")
-    found: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "devices": [device(LEFT), device(RIGHT)], "duration_s": 9.0, "protocol": "walk", "notices": [],
         "subject": {},
     }  # fmt: skip
     with clinic.db.write() as c:
         this = recordings.require_current(c, sid)
-        recordings.publish_inspection(c, this.id, this.input_sha256, found)
+        recordings.publish_inspection(c, this.id, this.input_sha256, fields)
     async with clinic.client("clinician") as client:
         page = (await client.get(f"/sessions/{sid}/upload")).text
         code = (await client.post(f"/api/v1/sessions/{sid}/live")).json()["code"]

@@ -1,4 +1,4 @@
-"""Names beside pseudonyms: encrypted, bound to their row, never under a key that nobody chose."""
+"""Identities: encrypted, bound to their row, only with the chosen key."""
 
 from __future__ import annotations
 
@@ -76,9 +76,9 @@ def test_what_was_written_down_comes_back_and_stands_nowhere_in_clear(names: Nam
     assert names.problems() == []
     names.keep()
     assert names.file.stat().st_mode & 0o077 == 0
-    found = names.get(names.one)
-    assert {name: getattr(found, name) for name in WHO} == WHO
-    assert "Erika" not in repr(found)
+    response = names.get(names.one)
+    assert {name: getattr(response, name) for name in WHO} == WHO
+    assert "Erika" not in repr(response)
     with names.db.read() as c:
         row = c.execute(select(patient_identity).where(patient_identity.c.patient_id == names.one)).one()
         sealed = [bytes(getattr(row, name)) for name in WHO]
@@ -89,12 +89,12 @@ def test_what_was_written_down_comes_back_and_stands_nowhere_in_clear(names: Nam
     assert "Erika" not in str(trail)
     assert names.problems() == []
     with names.db.write() as c:
-        again = identities.change(c, names.file, None, names.one, {"name": " ", "born_on": None})
-    assert (again.name, again.born_on, again.record_number) == (None, None, "R-77123")
+        second = identities.change(c, names.file, None, names.one, {"name": " ", "born_on": None})
+    assert (second.name, second.born_on, second.record_number) == (None, None, "R-77123")
     with names.db.write() as c:
         identities.change(c, names.file, None, names.one, dict.fromkeys(WHO))
-        kept = c.execute(select(patient_identity.c.patient_id)).scalars().all()
-    assert kept == [names.two]
+        stored_mask = c.execute(select(patient_identity.c.patient_id)).scalars().all()
+    assert stored_mask == [names.two]
     assert names.get(names.one) == PatientIdentity()
 
 
@@ -119,11 +119,11 @@ def test_a_row_or_a_field_in_the_place_of_another_is_seen(names: Names) -> None:
     names.keep()
     with names.db.write() as c:
         rows = {r.patient_id: r for r in c.execute(select(patient_identity))}
-        for own, other in ((names.one, names.two), (names.two, names.one)):
+        for own, second in ((names.one, names.two), (names.two, names.one)):
             c.execute(
                 update(patient_identity)
                 .where(patient_identity.c.patient_id == own)
-                .values(name=rows[other].name)
+                .values(name=rows[second].name)
             )
     for patient_id in (names.one, names.two):
         with pytest.raises(ValueUnreadable) as swapped:
@@ -154,7 +154,7 @@ def test_a_damaged_value_is_a_sentence(names: Names, cut: int) -> None:
 
 def test_a_missing_or_other_key_is_an_error_and_never_a_new_key(names: Names, tmp_path: Path) -> None:
     names.keep()
-    kept = names.file.read_bytes()
+    stored_content = names.file.read_bytes()
     names.file.unlink()
     with pytest.raises(KeyUnusable, match="not in its place"):
         names.get(names.one)
@@ -172,7 +172,7 @@ def test_a_missing_or_other_key_is_an_error_and_never_a_new_key(names: Names, tm
         names.file.write_bytes(content)
         with pytest.raises(KeyUnusable):
             names.get(names.one)
-    names.file.write_bytes(kept)
+    names.file.write_bytes(stored_content)
     assert names.get(names.one).name == WHO["name"]
     assert discard(names, really=True) == []
     with pytest.raises(KeyUnusable, match="exists"):
@@ -181,7 +181,7 @@ def test_a_missing_or_other_key_is_an_error_and_never_a_new_key(names: Names, tm
 
 def test_a_key_is_changed_while_all_can_be_read(names: Names, monkeypatch: pytest.MonkeyPatch) -> None:
     names.keep()
-    (before,) = read_keys(names.file).keys
+    (initial,) = read_keys(names.file).keys
     with monkeypatch.context() as patch:  # killed when the rows are written
         patch.setattr(identities, "drop_other_keys", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
@@ -194,15 +194,15 @@ def test_a_key_is_changed_while_all_can_be_read(names: Names, monkeypatch: pytes
     _, count = identities.change_key(names.db, link)
     assert link.is_symlink()
     assert count == 2
-    (after,) = read_keys(names.file).keys
-    assert after != before
+    (final,) = read_keys(names.file).keys
+    assert final != initial
     assert names.get(names.one).contact == WHO["contact"]
     with names.db.read() as c:
         rows = c.execute(select(patient_identity)).all()
     sealed = [bytes(value) for row in rows for value in row if isinstance(value, bytes)]
-    assert {value[1:9] for value in sealed} == {after}
+    assert {value[1:9] for value in sealed} == {final}
     with pytest.raises(ValueUnreadable):
-        FieldKeys({before: bytes(32)}).open(sealed[0], names.one, "name")
+        FieldKeys({initial: bytes(32)}).open(sealed[0], names.one, "name")
 
 
 def test_two_changes_at_once_lose_no_key(names: Names, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -215,8 +215,8 @@ def test_two_changes_at_once_lose_no_key(names: Names, monkeypatch: pytest.Monke
         add_key(path)
 
     monkeypatch.setattr(identities, "add_key", wait_and_add)
-    with ThreadPoolExecutor(2) as both:
-        done = [both.submit(identities.change_key, names.db, names.file) for _ in range(2)]
+    with ThreadPoolExecutor(2) as pair:
+        done = [pair.submit(identities.change_key, names.db, names.file) for _ in range(2)]
         assert [one.result()[1] for one in done] == [2, 2]
     assert len(read_keys(names.file).keys) == 1
     assert names.problems() == []
@@ -245,7 +245,7 @@ def discard(names: Names, *, really: bool = False, without_key: bool = False) ->
 @pytest.mark.parametrize("what", ["missing", "unreadable", "another"])
 def test_names_whose_key_is_only_not_in_its_place_are_not_removed(names: Names, what: str) -> None:
     names.keep()
-    kept = names.file.read_bytes()
+    stored_content = names.file.read_bytes()
     names.file.unlink()
     if what == "unreadable":
         names.file.write_bytes(b"\xff\xfe")
@@ -254,62 +254,62 @@ def test_names_whose_key_is_only_not_in_its_place_are_not_removed(names: Names, 
     assert len(discard(names)) == 2
     with pytest.raises(KeyUnusable, match="Nothing was removed"):
         discard(names, really=True)
-    names.file.write_bytes(kept)
+    names.file.write_bytes(stored_content)
     assert names.get(names.one).name == WHO["name"]
     assert names.problems() == []
 
 
 def test_one_key_seals_whatever_file_a_computer_has(names: Names, tmp_path: Path) -> None:
-    other = tmp_path / "other" / "identity.key"
-    other.parent.mkdir()
+    second = tmp_path / "other" / "identity.key"
+    second.parent.mkdir()
     identities.make_key(names.db, names.file)
     with pytest.raises(KeyUnusable, match="which is not at"):  # no name is there yet
-        identities.make_key(names.db, other)
-    assert not other.exists()
+        identities.make_key(names.db, second)
+    assert not second.exists()
     with names.db.read() as c:
-        assert identities.are_kept(c, other)
-    make_keys(other)
+        assert identities.are_kept(c, second)
+    make_keys(second)
     with names.db.write() as c, pytest.raises(KeyUnusable, match="the key file of this computer holds") as no:
-        identities.change(c, other, None, names.one, {"name": "X"})
+        identities.change(c, second, None, names.one, {"name": "X"})
     assert no.value.code == "identity_key_wrong"
     with pytest.raises(KeyUnusable):
-        identities.change_key(names.db, other)
+        identities.change_key(names.db, second)
     with names.db.read() as c:
-        assert len(identities.find_problems(c, other)) == 1
+        assert len(identities.find_problems(c, second)) == 1
     with names.db.write() as c:
         identities.change(c, names.file, None, names.one, WHO)
-    other.write_bytes(names.file.read_bytes())
+    second.write_bytes(names.file.read_bytes())
     with names.db.write() as c:
-        identities.change(c, other, None, names.two, {"name": "Uwe Otter"})
+        identities.change(c, second, None, names.two, {"name": "Uwe Otter"})
     identities.change_key(names.db, names.file)
     with names.db.write() as c, pytest.raises(KeyUnusable):  # the copy has the old key only
-        identities.change(c, other, None, names.two, {"name": "Uwe"})
+        identities.change(c, second, None, names.two, {"name": "Uwe"})
     assert names.problems() == []
 
 
 def test_a_key_that_was_added_and_not_yet_used_seals_nothing(names: Names) -> None:
     """A change of keys that was killed between its file and its commit."""
     names.keep()
-    (before,) = read_keys(names.file).keys
-    kept = names.file.with_name("node-b.key")
-    kept.write_bytes(names.file.read_bytes())
+    (initial,) = read_keys(names.file).keys
+    retained = names.file.with_name("node-b.key")
+    retained.write_bytes(names.file.read_bytes())
     add_key(names.file)
     with names.db.write() as c:
         identities.change(c, names.file, None, names.two, {"name": "Uwe"})
     with names.db.read() as c:
-        assert identities.get(c, kept, names.two).name == "Uwe"
+        assert identities.get(c, retained, names.two).name == "Uwe"
     assert identities.change_key(names.db, names.file)[1] == 2
     assert names.problems() == []
-    assert before not in read_keys(names.file).keys
+    assert initial not in read_keys(names.file).keys
 
 
 def test_what_no_key_opens_is_listed_and_only_then_removed(names: Names) -> None:
     names.keep()
     names.file.unlink()
-    both = sorted([names.one, names.two])
-    assert discard(names) == both
+    joint_items = sorted([names.one, names.two])
+    assert discard(names) == joint_items
     assert len(names.problems()) == 1
-    assert discard(names, really=True, without_key=True) == both
+    assert discard(names, really=True, without_key=True) == joint_items
     assert names.problems() == []
     identities.make_key(names.db, names.file)
     assert names.get(names.one) == PatientIdentity()

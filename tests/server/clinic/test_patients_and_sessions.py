@@ -67,12 +67,12 @@ class Clinic:
 
     def recording(self, session_id: str) -> recordings.StoredRecording:
         with self.db.read() as c:
-            found = recordings.current(c, session_id)
-        assert found is not None
-        return found
+            current = recordings.current(c, session_id)
+        assert current is not None
+        return current
 
     def analyse(self, session_id: str, content: bytes = b"{}") -> analyses.AnalysisRecord:
-        """What the worker does, without the numbers."""
+        """Publish an analysis like a worker, without results."""
         with self.db.write() as c:
             view = analyses.submit(c, self.queue, None, session_id)
         if view.state == "queued":
@@ -81,9 +81,9 @@ class Clinic:
             stored = {"analysis.json": self.blobs.put(claim.params["space"], content)}
             assert self.queue.finish(claim, lambda c: analyses.publish(c, claim, stored, "0" * 64))
         with self.db.read() as c:
-            found = analyses.latest(c, session_id)
-        assert found is not None
-        return found
+            latest = analyses.latest(c, session_id)
+        assert latest is not None
+        return latest
 
     def compare(self, session_id: str, reference: bytes, content: bytes = b"{}") -> None:
         """A comparison of filters against a reference, without the numbers."""
@@ -109,9 +109,9 @@ class Clinic:
 
 @pytest.fixture
 def clinic(tmp_path: Path, source: Source) -> Iterator[Clinic]:
-    made = Clinic(tmp_path, source)
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path, source)
+    yield new_clinic
+    new_clinic.db.close()
 
 
 def test_a_patient_is_made_renamed_and_found(clinic: Clinic) -> None:
@@ -189,9 +189,9 @@ def test_files_are_added_replaced_and_removed(clinic: Clinic) -> None:
     with clinic.db.read() as c:
         assert recordings.file_bytes(c, clinic.blobs, this.id, "trial/right.csv") == b"3"
     with clinic.db.write() as c:
-        after = recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
-    assert [f.name for f in after.files] == ["trial/right.csv"]
-    assert after.id == this.id
+        final = recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
+    assert [f.name for f in final.files] == ["trial/right.csv"]
+    assert final.id == this.id
     with pytest.raises(NotFound), clinic.db.write() as c:
         recordings.remove_file(c, clinic.who, session_id, "left 🦶.csv")
 
@@ -284,14 +284,14 @@ def test_without_files_there_is_nothing_to_do(clinic: Clinic) -> None:
 def test_an_inspection_of_files_that_have_changed_is_not_kept(clinic: Clinic) -> None:
     session_id = clinic.session(clinic.patient())
     clinic.upload(session_id, "a", b"1")
-    before = clinic.recording(session_id)
+    initial = clinic.recording(session_id)
     with clinic.db.write() as c:
-        recordings.publish_inspection(c, before.id, before.input_sha256, {"devices": []})
+        recordings.publish_inspection(c, initial.id, initial.input_sha256, {"devices": []})
     assert clinic.recording(session_id).state == "ready"
     clinic.upload(session_id, "b", b"2")
     assert clinic.recording(session_id).state == "draft"
     with pytest.raises(Conflict), clinic.db.write() as c:
-        recordings.publish_inspection(c, before.id, before.input_sha256, {"devices": []})
+        recordings.publish_inspection(c, initial.id, initial.input_sha256, {"devices": []})
 
 
 def test_files_are_looked_at_once_until_they_or_the_way_to_read_them_change(clinic: Clinic) -> None:
@@ -305,9 +305,9 @@ def test_files_are_looked_at_once_until_they_or_the_way_to_read_them_change(clin
         claim = clinic.queue.claim("w", (recordings.INSPECT,))
         if claim is not None:
             digest = claim.params["input_sha256"]
-            found: dict[str, object] = {"devices": []}
+            result: dict[str, object] = {"devices": []}
             assert clinic.queue.finish(
-                claim, lambda c: recordings.publish_inspection(c, str(claim.recording_id), digest, found)
+                claim, lambda c: recordings.publish_inspection(c, str(claim.recording_id), digest, result)
             )
         assert clinic.recording(session_id).state == "ready"
         return view.id

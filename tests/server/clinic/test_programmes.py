@@ -61,19 +61,19 @@ def test_what_has_passed_is_missing_and_the_first_ahead_is_next(db: Database) ->
     patient = _patient(db)
     starts = now().date() - dt.timedelta(days=1)
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=starts)
-    state = {v.label: v.state for v in made.visits}
+        instance = programmes.start(c, None, patient, starts_on=starts)
+    state = {v.label: v.state for v in instance.visits}
     assert (state["PRE"], state["T1"], state["T2"], state["T3"]) == ("missing", "missing", "next", "planned")
-    assert made.next is not None
-    assert made.next.label == "T2"
+    assert instance.next is not None
+    assert instance.next.label == "T2"
 
 
 def test_a_linked_session_makes_its_visit_done_and_unlinking_takes_it_back(db: Database) -> None:
     patient = _patient(db)
     session = _session(db, patient, MONDAY + dt.timedelta(days=1))
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
-        first = next(v for v in made.visits if v.label == "T1")
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
+        first = next(v for v in instance.visits if v.label == "T1")
         linked = programmes.change_visit(c, None, first.id, {"session_id": session})
     done = next(v for v in linked.visits if v.label == "T1")
     assert (done.state, done.performed_on) == ("done", MONDAY + dt.timedelta(days=1))
@@ -90,8 +90,8 @@ def test_a_visit_and_a_session_belong_to_each_other_alone(db: Database) -> None:
     patient, stranger = _patient(db), _patient(db, "P-2")
     one, two, foreign = _session(db, patient), _session(db, patient), _session(db, stranger)
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
-        first, second = made.visits[0].id, made.visits[1].id
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
+        first, second = instance.visits[0].id, instance.visits[1].id
         programmes.change_visit(c, None, first, {"session_id": one})
         for visit, session, code in (
             (first, two, "visit_taken"),
@@ -117,12 +117,12 @@ def test_a_programme_ends_without_its_sessions(db: Database) -> None:
     patient = _patient(db)
     session = _session(db, patient)
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
-        programmes.change_visit(c, None, made.visits[1].id, {"session_id": session})
-        programmes.end(c, None, made.id)
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
+        programmes.change_visit(c, None, instance.visits[1].id, {"session_id": session})
+        programmes.end(c, None, instance.id)
         assert sessions.get(c, session).id == session
         with pytest.raises(NotFound):
-            programmes.get(c, made.id)
+            programmes.get(c, instance.id)
 
 
 def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_no_plan(
@@ -133,11 +133,11 @@ def test_erasing_a_session_opens_its_visit_again_and_erasing_the_patient_leaves_
     patient = _patient(db)
     session = _session(db, patient)
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
-        programmes.change_visit(c, None, made.visits[1].id, {"session_id": session})
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
+        programmes.change_visit(c, None, instance.visits[1].id, {"session_id": session})
     erasure.erase_session(db, ReviewedAnalyses(blobs), settings, None, session)
     with db.read() as c:
-        assert programmes.get(c, made.id).count("done") == 0
+        assert programmes.get(c, instance.id).count("done") == 0
     erasure.erase_patient(db, ReviewedAnalyses(blobs), settings, None, patient, confirm="P-1")
     with db.read() as c:
         assert c.execute(select(planned_visit)).first() is None
@@ -147,13 +147,13 @@ def test_a_session_is_offered_for_the_open_visit_next_to_its_day(db: Database) -
     patient = _patient(db)
     session = _session(db, patient)
     with db.write() as c:
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
-        near = made.near(MONDAY + dt.timedelta(days=1))
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
+        near = instance.near(MONDAY + dt.timedelta(days=1))
         assert near is not None
         assert near.label in {"T1", "T2"}
         linked = programmes.change_visit(c, None, near.id, {"session_id": session})
     assert linked.near(MONDAY) != near
-    assert made.near(MONDAY + dt.timedelta(days=70)) is None
+    assert instance.near(MONDAY + dt.timedelta(days=70)) is None
 
 
 def test_nonsense_is_refused_with_a_sentence(db: Database) -> None:
@@ -163,6 +163,6 @@ def test_nonsense_is_refused_with_a_sentence(db: Database) -> None:
             programmes.start(c, None, patient, starts_on=MONDAY, template="ten_years")
         with pytest.raises(ServiceError, match="check the year"):
             programmes.start(c, None, patient, starts_on=dt.date.min)
-        made = programmes.start(c, None, patient, starts_on=MONDAY)
+        instance = programmes.start(c, None, patient, starts_on=MONDAY)
         with pytest.raises(ServiceError, match="planned_on"):
-            programmes.change_visit(c, None, made.visits[0].id, {"planned_on": None})
+            programmes.change_visit(c, None, instance.visits[0].id, {"planned_on": None})

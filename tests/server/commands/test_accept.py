@@ -22,24 +22,24 @@ def actions(clinic: Clinic) -> list[str]:
 def test_a_database_that_nobody_doubts_is_left_as_it_is(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before = actions(clinic)
+    initial = actions(clinic)
     assert accept(data_dir=clinic.folder) == 0
     assert capsys.readouterr().out == "There was no doubt about this database; nothing is changed.\n"
-    assert actions(clinic) == before
+    assert actions(clinic) == initial
 
 
 def test_a_database_that_has_lost_rows_is_the_right_one_from_then_on(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
     set_mark(clinic.db, clinic.settings.mark)
-    known = clinic.settings.mark.read_text()
+    known_text = clinic.settings.mark.read_text()
     rows = len(actions(clinic))
-    clinic.settings.mark.write_text(known.replace(f": {rows}", f": {rows + 7}"))
+    clinic.settings.mark.write_text(known_text.replace(f": {rows}", f": {rows + 7}"))
     assert accept(data_dir=clinic.folder) == 0
-    said = capsys.readouterr().out
-    assert f"ends at row {rows}, but had reached row {rows + 7}" in said
+    stdout = capsys.readouterr().out
+    assert f"ends at row {rows}, but had reached row {rows + 7}" in stdout
     assert (
-        f"go to {clinic.settings.trash} and stay 30 days; live logs stay in {clinic.settings.live}." in said
+        f"go to {clinic.settings.trash} and stay 30 days; live logs stay in {clinic.settings.live}." in stdout
     )
     assert actions(clinic)[-1] == custody.ACCEPTED
     with clinic.db.read() as c:

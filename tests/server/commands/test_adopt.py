@@ -56,9 +56,9 @@ def test_a_stray_becomes_the_recording_of_the_session_and_is_analysed(
     assert adopt(stray, session=address.format(session), data_dir=clinic.folder) == 0
     assert f"newest recording of /sessions/{session} now" in capsys.readouterr().out
     with clinic.db.read() as c:
-        made = recordings.require_current(c, session)
+        current = recordings.require_current(c, session)
         kinds = {view.kind for view in jobs.of_session(c, session)}
-    assert [f.name for f in made.files] != ["a.txt"]
+    assert [f.name for f in current.files] != ["a.txt"]
     assert recordings.ANALYSE in kinds
 
 

@@ -1,4 +1,4 @@
-"""What `sagittal analyse` cannot do is said in a sentence that names what was typed."""
+"""Error messages of `sagittal analyse` name the wrong input."""
 
 from __future__ import annotations
 

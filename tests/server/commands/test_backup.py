@@ -23,10 +23,10 @@ def test_a_backup_is_said_with_its_size_and_the_end_of_the_audit_log(
         head = read_newest(c)
     assert head is not None
     assert backup(disk, prune=False, data_dir=clinic.folder) == 0
-    (made,) = list_backups(disk)
-    said = capsys.readouterr().out
-    assert said.startswith(f"{made.path}: ")
-    assert said.endswith(f" {made.path.stat().st_size} bytes, audit head {head.seq}:{head.hash}\n")
+    (result,) = list_backups(disk)
+    stdout = capsys.readouterr().out
+    assert stdout.startswith(f"{result.path}: ")
+    assert stdout.endswith(f" {result.path.stat().st_size} bytes, audit head {head.seq}:{head.hash}\n")
 
 
 def test_a_key_of_names_that_is_not_in_it_is_told(
@@ -46,17 +46,17 @@ def test_old_backups_go_when_that_is_asked_for_and_nothing_else(
     clinic: Clinic, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     old = [tmp_path / "disk" / f"sagittal-20200101T0{i}0000Z.tar" for i in (1, 2)]
-    other = tmp_path / "disk" / "holiday.jpg"
-    other.parent.mkdir()
-    for path in (*old, other):
+    second = tmp_path / "disk" / "holiday.jpg"
+    second.parent.mkdir()
+    for path in (*old, second):
         path.touch()
-    assert backup(other.parent, prune=False, data_dir=clinic.folder) == 0
+    assert backup(second.parent, prune=False, data_dir=clinic.folder) == 0
     assert all(path.exists() for path in old)
     capsys.readouterr()
-    assert backup(other.parent / "now.tar", prune=True, data_dir=clinic.folder) == 0
+    assert backup(second.parent / "now.tar", prune=True, data_dir=clinic.folder) == 0
     assert f"removed {old[0]}\n" in capsys.readouterr().out
     assert not old[0].exists()
-    assert other.exists()
+    assert second.exists()
 
 
 def test_a_damaged_file_is_named_and_the_rest_is_kept(
@@ -65,8 +65,8 @@ def test_a_damaged_file_is_named_and_the_rest_is_kept(
     (one,) = clinic.blobs.files()
     clinic.blobs.find_path(one).write_bytes(b"signalz")
     assert backup(tmp_path / "made.tar", prune=False, data_dir=clinic.folder) == 1
-    said = capsys.readouterr()
-    assert said.err == f"patient {one.space}: {one.name[:12]}… is gone or damaged; see `sagittal check`\n"
+    captured = capsys.readouterr()
+    assert captured.err == f"patient {one.space}: {one.name[:12]}… is gone or damaged; see `sagittal check`\n"
     assert (tmp_path / "made.tar").exists()
 
 

@@ -63,10 +63,10 @@ def test_a_command_runs_in_a_bare_container(
     if command == "warm":
         monkeypatch.setenv(VARIABLE, str(tmp_path / "file" / "filters"))
     monkeypatch.setattr("sys.stdin", io.StringIO("correct horse battery\n"))
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        words = {"port": taken.getsockname()[1], "none": tmp_path / "none", "out": out}
+    with socket.socket() as selection:
+        selection.bind(("127.0.0.1", 0))
+        selection.listen()
+        words = {"port": selection.getsockname()[1], "none": tmp_path / "none", "out": out}
         code = main([command, *(word.format(**words) for word in ARGUMENTS[command])])
     refused = "unencrypted" in capsys.readouterr().err
     assert refused == (command == "serve")

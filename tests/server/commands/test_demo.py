@@ -1,4 +1,4 @@
-"""What `sagittal demo` says of its live walk is true when it says it."""
+"""Messages of `sagittal demo` about its live walk are true when printed."""
 
 from __future__ import annotations
 

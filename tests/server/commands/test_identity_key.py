@@ -18,18 +18,18 @@ def keep_name(clinic: Clinic) -> None:
 
 def ask(
     clinic: Clinic,
-    what: Literal["make", "change", "discard"],
+    label: Literal["make", "change", "discard"],
     really: bool = False,
     without_key: bool = False,
 ) -> int:
-    return identity_key(what, really=really, without_key=without_key, data_dir=clinic.folder)
+    return identity_key(label, really=really, without_key=without_key, data_dir=clinic.folder)
 
 
 def test_a_key_is_made_once(clinic: Clinic, capsys: pytest.CaptureFixture[str]) -> None:
     file = clinic.settings.identity_key_file
     assert ask(clinic, "make") == 0
-    said = capsys.readouterr().out
-    assert said.startswith(f"{file} holds the key ")
+    stdout = capsys.readouterr().out
+    assert stdout.startswith(f"{file} holds the key ")
     content = file.read_bytes()
     assert ask(clinic, "make") == 1
     assert capsys.readouterr().out == ""

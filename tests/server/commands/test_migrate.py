@@ -20,8 +20,8 @@ def test_a_database_of_a_newer_version_is_refused(clinic: Clinic, capsys: pytest
     with clinic.db.write() as c:
         c.exec_driver_sql("UPDATE alembic_version SET version_num = 'of_tomorrow'")
     assert migrate(data_dir=clinic.folder) == 1
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert "of_tomorrow" in said.err
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "of_tomorrow" in captured.err
     with clinic.db.read() as c:
         assert c.exec_driver_sql("SELECT version_num FROM alembic_version").scalar() == "of_tomorrow"

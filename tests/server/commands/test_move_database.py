@@ -1,4 +1,4 @@
-"""`sagittal move-database`: what is refused before anything moves; storage/test_postgres.py has the move."""
+"""`sagittal move-database`: refusals before anything is moved; storage/test_postgres.py tests the move."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`sagittal replay`: options that make no sense, and what is said of a finished take."""
+"""`sagittal replay`: invalid options, and the message after a finished trial."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def test_an_option_out_of_range_is_named_before_anything_is_read(
 def test_the_ends_of_the_ranges_are_allowed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "walk.txt").write_text("no recording")
     assert replay([tmp_path / "walk.txt"], to=NOBODY, code="ABCDEF", speed=0.0, drop=0.0, jitter=0.0) == 1
-    said = capsys.readouterr().err
-    assert said.startswith("Not replayed (")
-    assert "bad_option" not in said
+    stderr = capsys.readouterr().err
+    assert stderr.startswith("Not replayed (")
+    assert "bad_option" not in stderr
 
 
 def report(**changes: Any) -> StreamReport:
-    known: dict[str, Any] = {"sent": 3, "recording": "r1", "sha256": "0123456789abcdef"}
-    return StreamReport(**(known | changes))
+    known_fields: dict[str, Any] = {"sent": 3, "recording": "r1", "sha256": "0123456789abcdef"}
+    return StreamReport(**(known_fields | changes))
 
 
 BATCHES = [DueBatch(float(i), b"") for i in range(4)]

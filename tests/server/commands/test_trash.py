@@ -17,10 +17,10 @@ AT = dt.datetime(2026, 3, 14, 3, 15, tzinfo=dt.UTC)
 def discard(clinic: Clinic) -> BlobFile:
     """Move the stored file of the patient into the trash, as the sweep of a wrong database would."""
     (one,) = clinic.blobs.files()
-    found = [(one.space, one.name)]
-    clinic.blobs.trash.prepare(found, AT)
-    clinic.blobs.trash.take(found, AT)
-    clinic.blobs.trash.settle(found, AT)
+    result = [(one.space, one.name)]
+    clinic.blobs.trash.prepare(result, AT)
+    clinic.blobs.trash.take(result, AT)
+    clinic.blobs.trash.settle(result, AT)
     assert isinstance(one, BlobFile)
     return one
 
@@ -59,8 +59,8 @@ def test_what_the_database_knows_is_put_back(clinic: Clinic, capsys: pytest.Capt
     one = discard(clinic)
     assert list(clinic.blobs.files()) == []
     assert trash(restore=True, data_dir=clinic.folder) == 0
-    said = capsys.readouterr().out
-    assert said == f"1 files that the database refers to are back in {clinic.settings.blobs}\n"
+    stdout = capsys.readouterr().out
+    assert stdout == f"1 files that the database refers to are back in {clinic.settings.blobs}\n"
     assert clinic.blobs.read(one.space, one.name) == b"signals"
 
 

@@ -15,7 +15,7 @@ from tests.faults.clinic import Clinic
 
 @pytest.fixture(autouse=True)
 def own_process_again() -> Iterator[None]:
-    """A command may do with its process what it likes; that of the tests gets its own back."""
+    """Restore the test process's settings that commands may change."""
     mask = os.umask(0o022)
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT)}
     yield

@@ -1,4 +1,4 @@
-"""A command that is given a wrong folder says so and begins no clinic there."""
+"""Commands with a wrong folder report it and create no clinic."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def test_no_clinic_begins_in_a_wrong_folder(
 def test_a_user_of_a_new_clinic_is_told_that_it_is_new(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for said in (f"There was no database in {tmp_path}: a new clinic begins there.\n", ""):
+    for message in (f"There was no database in {tmp_path}: a new clinic begins there.\n", ""):
         monkeypatch.setattr("sys.stdin", io.StringIO("correct horse battery\n"))
         assert main(["user", "anna", "--role", "admin", "--data", str(tmp_path)]) == 0
-        assert capsys.readouterr().out == f"{said}anna can sign in.\n"
+        assert capsys.readouterr().out == f"{message}anna can sign in.\n"
 
 
 @pytest.mark.parametrize("command", ["serve", "check", "worker"])

@@ -49,15 +49,15 @@ def test_the_two_walks_of_the_volunteer_are_not_compared_and_those_of_the_patien
 )
 def test_every_estimator_has_its_visit(script: str, method: str, reduced: str | None) -> None:
     visit = next(v for v in VISITS if v.script == script)
-    made = analyse(record(visit).recording)
-    assert made.problem is None
-    assert made.poses is not None
-    assert (made.poses.method, made.poses.reduced) == (method, reduced)
+    analysis = analyse(record(visit).recording)
+    assert analysis.problem is None
+    assert analysis.poses is not None
+    assert (analysis.poses.method, analysis.poses.reduced) == (method, reduced)
 
 
 @pytest.mark.sweep
 def test_the_newest_walks_have_good_data_but_for_the_sensor_that_stopped() -> None:
-    """People who walk unlike others are not mistaken for sensors that sit wrongly."""
+    """Unusual gait is not mistaken for wrongly placed sensors."""
     newest = {v.person.code: v for v in reversed(VISITS)}
     warned = {
         code

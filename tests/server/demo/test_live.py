@@ -28,10 +28,10 @@ async def test_the_demo_s_live_patient_walks_is_told_how_and_becomes_a_recording
             someone = patients.create(c, None, code=person.code, **fields)
             prescriptions.write(c, clinic.app.state.reviewed, None, someone.id, content)
         code = open_take(clinic.settings)
-        made = plan_training(laps=1)
+        result = plan_training(laps=1)
         # a client with a loop of its own, as in the demo
         await asyncio.to_thread(
-            lambda: asyncio.run(stream_walk(f"http://127.0.0.1:{port}", code, made.recording, speed=10.0))
+            lambda: asyncio.run(stream_walk(f"http://127.0.0.1:{port}", code, result.recording, speed=10.0))
         )
         with clinic.db.read() as c:
             sid = c.execute(session.select()).one().id

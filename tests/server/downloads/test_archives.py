@@ -37,53 +37,55 @@ def visit(
     config: Mapping[str, Any] = CONFIG,
 ) -> bytes:
     """An archive of these original files."""
-    kept = [RecordedFile(name, len(data), store.put(SPACE, data).sha256) for name, data in files.items()]
-    recording = StoredRecording("r", "s", SPACE, "ready", tuple(kept), manifest, None, None)
-    found = AnalysisRecord(
+    retained = [RecordedFile(name, len(data), store.put(SPACE, data).sha256) for name, data in files.items()]
+    recording = StoredRecording("r", "s", SPACE, "ready", tuple(retained), manifest, None, None)
+    analysis_record = AnalysisRecord(
         "a", "r", "s", SPACE, "j", "", "", "source", manifest, config, dt.datetime(2026, 1, 2, tzinfo=dt.UTC),
         {name: store.put(SPACE, data) for name, data in results.items()},
     )  # fmt: skip
     out = io.BytesIO()
     archives.write_archive(
-        out, store, recording, found, EditHistory(), {"parameters.csv": b"name\n"}, signed(store)
+        out, store, recording, analysis_record, EditHistory(), {"parameters.csv": b"name\n"}, signed(store)
     )
     return out.getvalue()
 
 
 def signed(store: FolderBlobs) -> SignedDocuments:
     """A signed report of that analysis with its PDF."""
-    at = dt.datetime(2026, 1, 3, tzinfo=dt.UTC)
+    timestamp = dt.datetime(2026, 1, 3, tzinfo=dt.UTC)
     html, pdf = (store.put(SPACE, text) for text in (b"<p>Signed</p>", b"%PDF-1.7"))
-    report = SignedReport("p", "s", 1, "a", "en", "Therapist 1", at, None, None, None, html.sha256)
+    report = SignedReport("p", "s", 1, "a", "en", "Therapist 1", timestamp, None, None, None, html.sha256)
     return SignedDocuments(report, {"report.html": html, "report.pdf": pdf})
 
 
 @pytest.mark.slow
 def test_an_archive_is_analysed_to_the_same_bits(tmp_path: Path) -> None:
-    made = simulate_scenario("comfortable", 1).recording
-    files = mt_files(made, "walk")
-    worn = {device: segment for device, segment in made.segments.items() if segment is not None}
+    output = simulate_scenario("comfortable", 1).recording
+    files = mt_files(output, "walk")
+    by_device = {device: segment for device, segment in output.segments.items() if segment is not None}
     manifest = {"subject": {"height_m": 1.75}, "protocol": "walk"}
     # one zip with a manifest of its own, as a person may have uploaded it
-    upload = {"walk.zip": zipped(files | {"manifest.json": json.dumps({"sensors": worn}).encode()})}
+    upload = {"walk.zip": zipped(files | {"manifest.json": json.dumps({"sensors": by_device}).encode()})}
     sources = [SourceFile.of_bytes(name, data) for name, data in upload.items()]
     results = analysing.run(sources, json.dumps(manifest).encode(), CONFIG, lambda stage, share: None)
     archive = visit(FolderBlobs(tmp_path / "blobs"), upload, manifest, results)
 
     with zipfile.ZipFile(io.BytesIO(archive)) as opened:
         names = set(opened.namelist())
-        told = json.loads(opened.read("sagittal-episode.json"))
+        document = json.loads(opened.read("sagittal-episode.json"))
         assert opened.read("results/analysis.json") == results["analysis.json"]
     assert {f"recording/{name}" for name in files} < names
-    assert told["sha256"].keys() == names - {"sagittal-episode.json"}
+    assert document["sha256"].keys() == names - {"sagittal-episode.json"}
 
-    again = analysing.run([SourceFile.of_bytes("visit.zip", archive)], None, None, lambda stage, share: None)
-    first, second = (json.loads(found["analysis.json"]) for found in (results, again))
+    second_result = analysing.run(
+        [SourceFile.of_bytes("visit.zip", archive)], None, None, lambda stage, share: None
+    )
+    first, second = (json.loads(result["analysis.json"]) for result in (results, second_result))
     assert second["parameters"] == first["parameters"]
     assert any(p["mean"] is not None for p in first["parameters"])
     assert second["provenance"]["parameters_sha256"] == first["provenance"]["parameters_sha256"]
-    assert again["strides.csv"] == results["strides.csv"]
-    assert again["angles.parquet"] == results["angles.parquet"]
+    assert second_result["strides.csv"] == results["strides.csv"]
+    assert second_result["angles.parquet"] == results["angles.parquet"]
 
 
 def test_results_in_an_archive_are_not_read_as_recordings(tmp_path: Path) -> None:
@@ -105,8 +107,12 @@ def test_results_in_an_archive_are_not_read_as_recordings(tmp_path: Path) -> Non
     with zipfile.ZipFile(io.BytesIO(archive)) as opened:
         assert opened.read("report/report.html") == b"<p>Signed</p>"
         assert opened.read("report/report.pdf") == b"%PDF-1.7"
-        told = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
-    assert (told["version"], told["signed_by"], told["of_these_numbers"]) == (1, "Therapist 1", True)
+        document = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
+    assert (document["version"], document["signed_by"], document["of_these_numbers"]) == (
+        1,
+        "Therapist 1",
+        True,
+    )
 
 
 def test_an_archive_of_an_archive_has_its_settings_and_the_newest_manifest(tmp_path: Path) -> None:
@@ -117,8 +123,8 @@ def test_an_archive_of_an_archive_has_its_settings_and_the_newest_manifest(tmp_p
     first = {"sources": [source], "sensors": {"a": "pelvis"}, "subject": {"height_m": 1.7}}
     archive = visit(store, {"a.csv": table}, first, {})
     # somebody puts right who wears what, and it is handed on twice
-    for told in ({"sensors": {"a": "chest"}}, {}, {"protocol": "walk"}):
-        archive = visit(store, {"visit.zip": archive}, told, {}, {})
+    for notices in ({"sensors": {"a": "chest"}}, {}, {"protocol": "walk"}):
+        archive = visit(store, {"visit.zip": archive}, notices, {}, {})
     file = SourceFile.of_bytes("visit.zip", archive)
     assert analysing.choose_config([file], None) == CONFIG
     recording = read_recording([file])

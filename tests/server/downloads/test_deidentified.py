@@ -1,4 +1,4 @@
-"""Results for research: nothing in them says who, intervals stay, and only the key leads back."""
+"""Research export: no identity, correct intervals, re-identification by the key only."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ DAYS = (dt.date(2025, 3, 3), dt.date(2025, 3, 24))
 
 @pytest.fixture
 async def clinic(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Clinic]:
-    async with open_clinic(tmp_path / "data") as made:
-        tell_commands(monkeypatch, made.settings)
-        yield made
+    async with open_clinic(tmp_path / "data") as result:
+        tell_commands(monkeypatch, result.settings)
+        yield result
 
 
 def _fill(clinic: Clinic) -> tuple[str, list[str]]:
@@ -40,12 +40,12 @@ def _fill(clinic: Clinic) -> tuple[str, list[str]]:
         person = patients.create(
             c, None, code=f"{CANARY}-1", note=f"{CANARY} street", birth_year=1930, height_m=1.61, sex="female"
         ).id
-        other = patients.create(c, None, code=f"{CANARY}-2").id
+        other_id = patients.create(c, None, code=f"{CANARY}-2").id
         visits = [
             sessions.create(c, None, person, title=f"{CANARY} walk", note=CANARY, performed_on=day).id
             for day in DAYS
         ]
-        sessions.create(c, None, other, title="nothing recorded")
+        sessions.create(c, None, other_id, title="nothing recorded")
         consents.give(c, None, person, purpose="research", evidence=f"{CANARY} form")
     for visit in visits:
         analysed.finish(clinic, person, visit, analysed.files())
@@ -53,8 +53,8 @@ def _fill(clinic: Clinic) -> tuple[str, list[str]]:
 
 
 def _write(clinic: Clinic, out: Path, key: Path, **options: object) -> int:
-    given = {"patients": (), "signals": False, "without_consent": False, "who": None, **options}
-    return research(out, data_dir=clinic.settings.data_dir, key=key, **given)  # type: ignore[arg-type]
+    inputs = {"patients": (), "signals": False, "without_consent": False, "who": None, **options}
+    return research(out, data_dir=clinic.settings.data_dir, key=key, **inputs)  # type: ignore[arg-type]
 
 
 def _read(path: Path) -> dict[str, bytes]:
@@ -87,12 +87,12 @@ async def test_nothing_says_who_and_only_the_key_leads_back(
     files = _read(out)
 
     # no word, id, day, checksum or serial number of it
-    told = {name: content for name, content in files.items() if name != "README.md"}
+    by_name = {name: content for name, content in files.items() if name != "README.md"}
     hidden = [CANARY, person, *visits, "F-left", "walk.txt", "sha256"]
-    assert [word for word in hidden if word.encode() in b"".join(told.values())] == []
-    cells = {cell for name, text in told.items() if name.endswith(".csv") for cell in _cells(text)}
+    assert [word for word in hidden if word.encode() in b"".join(by_name.values())] == []
+    cells = {cell for name, text in by_name.items() if name.endswith(".csv") for cell in _cells(text)}
     assert not cells & {"1930", "A1", "ff"}
-    measured = [read_table(content) for name, content in told.items() if name.startswith("signals/")]
+    measured = [read_table(content) for name, content in by_name.items() if name.startswith("signals/")]
     assert [set(meta) for _, meta in measured] == [{"schema", "rate_hz"}] * 2
     assert all("foot_l_gyr_y_dps" in table.column_names for table, _ in measured)
     reasons = {row["excluded_reason"] for row in _table(files, "strides")}

@@ -1,4 +1,4 @@
-"""One patient in one zip: all that is stored, nothing of anybody else, nothing that opens a door."""
+"""Export of one patient: complete, nothing of others, no secrets."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
             )
         )  # fmt: skip
         c.execute(insert(live_event).values(take_id=take, kind="mark", content={"x": 1}, at=now()))
-        other = patients.create(c, None, code="P-OTHER")
-        sessions.create(c, None, other.id, title="of the other")
+        second = patients.create(c, None, code="P-OTHER")
+        sessions.create(c, None, second.id, title="of the other")
     with clinic.db.read() as c:
         used = {sha256 for space, sha256 in list_referenced(c) if space == clinic.patient.id}
     lost = next(f for f in clinic.blobs.files() if clinic.blobs.find_path(f).read_bytes() == b"signals")
@@ -54,8 +54,8 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
         about = json.loads(archive.read("patient.json"))
         trail = json.loads(archive.read("audit.json"))
         missing = json.loads(archive.read("missing.json"))
-        kept = {name: archive.read(name) for name in names if name.startswith("files/")}
-    assert sorted(kept.values()) == [bytes(3 * PIECE + 7), b"outside"]
+        stored_by_name = {name: archive.read(name) for name in names if name.startswith("files/")}
+    assert sorted(stored_by_name.values()) == [bytes(3 * PIECE + 7), b"outside"]
     assert not [name for name in names if ".." in name]
     assert [one["name"].endswith("a.txt") for one in missing] == [True]
     rows = about["rows"]
@@ -65,7 +65,7 @@ def test_everything_of_one_patient_and_nothing_else(tmp_path: Path) -> None:
     assert rows["live_event"][0]["kind"] == "mark"
     assert {"patient.created", "session.created", "recording.file_added"} <= {row["action"] for row in trail}
     text = json.dumps([about, trail])
-    assert other.id not in text
+    assert second.id not in text
     assert "of the other" not in text
     assert "c" * 64 not in text
     assert "d" * 64 not in text

@@ -46,8 +46,8 @@ class Course:
         self.jane = feedback.person(stored, note="Jane Doe", birth_year=1930)
         self.walked = [feedback.walked(stored, self.jane, days, 12.0) for days in (0, 7)]
         self.empty = feedback.visit(stored, self.jane, 9, title="Jane")
-        other = feedback.person(stored)
-        self.other = feedback.walked(stored, other, 1, 12.0, protocol="treadmill")
+        other_patient = feedback.person(stored)
+        self.other = feedback.walked(stored, other_patient, 1, 12.0, protocol="treadmill")
 
     def chosen(self, **choice: Any) -> list[str]:
         with self.stored.db.read() as c:
@@ -74,9 +74,9 @@ def test_a_choice_is_by_words_protocol_days_and_ticks(course: Course) -> None:
 
 def test_persons_and_visits_stand_in_the_tables_by_pseudonyms_and_days_from_the_first(course: Course) -> None:
     stored = course.stored
-    made, visits = make_study(stored.db, stored.app.state.reviewed, ADMIN, StudyChoice(search="Jane Doe"))
+    study, visits = make_study(stored.db, stored.app.state.reviewed, ADMIN, StudyChoice(search="Jane Doe"))
     assert visits == [*course.walked, course.empty]
-    rows = list(csv.DictReader(io.StringIO(made.files["takes.csv"].decode())))
+    rows = list(csv.DictReader(io.StringIO(study.files["takes.csv"].decode())))
     sub = make_pseudonym(course.jane)
     assert [r["take"] for r in rows] == [f"sub-{sub}/ses-{make_pseudonym(v)}" for v in visits]
     assert [r["days_since_first"] for r in rows] == ["0", "7", "9"]
@@ -85,23 +85,23 @@ def test_persons_and_visits_stand_in_the_tables_by_pseudonyms_and_days_from_the_
     assert rows[0]["sex"] == "male"
     assert rows[0]["height_m"] == "1.75"
     assert rows[0]["edits"] == "0"
-    assert made.failed == 1
-    assert b"Analyse it, or leave it out." in made.files[FAILURES]
-    told = b"".join(made.files.values())
+    assert study.failed == 1
+    assert b"Analyse it, or leave it out." in study.files[FAILURES]
+    text = b"".join(study.files.values())
     for secret in (b"Jane", course.jane.encode(), course.walked[0].encode(), b"walk.txt", b"2026-03"):
-        assert secret not in told, secret
+        assert secret not in text, secret
 
 
 def test_provenance_has_the_hash_of_each_file_by_a_number(course: Course) -> None:
     stored = course.stored
     choice = StudyChoice(visits=frozenset(course.walked[:1]))
-    made, _ = make_study(stored.db, stored.app.state.reviewed, ADMIN, choice)
+    study, _ = make_study(stored.db, stored.app.state.reviewed, ADMIN, choice)
     with stored.db.read() as c:
         (file,) = recordings.require_current(c, course.walked[0]).files
-    said = json.loads(made.files[PROVENANCE])
-    (found,) = said["takes"].values()
-    assert found == {"sha256": {"file-1": file.sha256}, "error": None}
-    assert list(said["analyses"]) == list(said["takes"])
+    document = json.loads(study.files[PROVENANCE])
+    (result,) = document["takes"].values()
+    assert result == {"sha256": {"file-1": file.sha256}, "error": None}
+    assert list(document["analyses"]) == list(document["takes"])
 
 
 def test_a_visit_that_cannot_be_read_is_told_and_the_others_go_on(course: Course) -> None:
@@ -115,11 +115,11 @@ def test_a_visit_that_cannot_be_read_is_told_and_the_others_go_on(course: Course
     path.write_bytes(b"{}")
     try:
         stored.app.state.reviewed.forget()
-        made, visits = make_study(stored.db, stored.app.state.reviewed, ADMIN, choice)
+        study, visits = make_study(stored.db, stored.app.state.reviewed, ADMIN, choice)
     finally:
         path.write_bytes(content)
         # the visits of the course are those of the other tests
         erase_session(stored.db, stored.app.state.reviewed, stored.settings, None, lost)
     assert len(visits) == 2
-    assert made.failed == 1
-    assert made.strides > 0
+    assert study.failed == 1
+    assert study.strides > 0

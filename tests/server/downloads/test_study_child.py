@@ -1,4 +1,4 @@
-"""The process that makes the tables of a study: what it answers."""
+"""Responses of the study process."""
 
 from __future__ import annotations
 

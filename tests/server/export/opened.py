@@ -13,5 +13,5 @@ FACTS = VisitFacts("s1", "=HYPERLINK(1)", "v1", "2026-03-02", sex="female", age_
 
 def open_walk(*edits: Edit, files: Mapping[str, bytes] | None = None) -> ExportContent:
     """The walk, or another analysis, with a person's edits."""
-    given = analysed.files() if files is None else files
-    return open_content({name: lambda x=x: x for name, x in given.items()}, FACTS, edits)  # type: ignore[misc]
+    inputs = analysed.files() if files is None else files
+    return open_content({name: lambda x=x: x for name, x in inputs.items()}, FACTS, edits)  # type: ignore[misc]

@@ -52,9 +52,9 @@ def check_name(path: str, schema: Any) -> None:
         if suffix in r.suffixes and "motion" in r.datatypes
     ]
     assert f".{ending}" in rule.extensions
-    given = {long[short] for short in entities}
+    inputs = {long[short] for short in entities}
     required = {e for e, level in rule.entities.items() if level == "required"}
-    assert required <= given <= set(rule.entities)
+    assert required <= inputs <= set(rule.entities)
 
 
 @pytest.mark.slow
@@ -69,12 +69,12 @@ def test_names_fields_columns_and_counts_are_those_of_the_standard() -> None:
     assert {"Name", "BIDSVersion"} <= set(described)
 
     tracked = f"{SUBJECT}_tracksys-imu"
-    said, channels = json.loads(files[f"{tracked}_motion.json"]), rows(files[f"{tracked}_channels.tsv"])
+    document, channels = json.loads(files[f"{tracked}_motion.json"]), rows(files[f"{tracked}_channels.tsv"])
     for group in schema.rules.sidecars.motion.values():
         for name, rule in group.fields.items():
             if (rule if isinstance(rule, str) else rule["level"]) == "required":
-                assert name in said
-    assert said["TrackingSystemName"] == "imu"
+                assert name in document
+    assert document["TrackingSystemName"] == "imu"
     rule = schema.rules.tabular_data.motion.motionChannels
     columns = [schema.objects.columns[n].name for n, level in rule.columns.items() if level == "required"]
     assert list(channels[0])[: len(columns)] == columns
@@ -85,13 +85,13 @@ def test_names_fields_columns_and_counts_are_those_of_the_standard() -> None:
             row["reference_frame"]
             in json.loads(files[f"{tracked}_channels.json"])["reference_frame"]["Levels"]
         )
-    assert len({row["name"] for row in channels}) == len(channels) == said["MotionChannelCount"]
-    assert len({row["tracked_point"] for row in channels}) == said["TrackedPointsCount"]
+    assert len({row["name"] for row in channels}) == len(channels) == document["MotionChannelCount"]
+    assert len({row["tracked_point"] for row in channels}) == document["TrackedPointsCount"]
     for kind in ("ACCEL", "GYRO", "MAGN"):
-        assert sum(row["type"] == kind for row in channels) == said[f"{kind}ChannelCount"]
+        assert sum(row["type"] == kind for row in channels) == document[f"{kind}ChannelCount"]
     motion = files[f"{tracked}_motion.tsv"].decode().split("\n")
     assert {len(line.split("\t")) for line in motion[:-1]} == {len(channels)}
-    assert len(motion) - 1 == said["RecordingDuration"] * said["SamplingFrequency"]
+    assert len(motion) - 1 == document["RecordingDuration"] * document["SamplingFrequency"]
 
 
 def test_signals_are_the_stored_ones_in_si_units() -> None:
@@ -107,19 +107,19 @@ def test_signals_are_the_stored_ones_in_si_units() -> None:
 def test_events_say_which_strides_were_left_out_and_by_whom() -> None:
     cycle = next(c for c in open_walk().cycles if c.excluded is None)
     edit = Edit("exclude_stride", cycle.side, (cycle.start_s + cycle.end_s) / 2, reason="stumbled")
-    found = rows(written(open_walk(edit))[f"{SUBJECT}_events.tsv"])
-    assert [float(row["onset"]) for row in found] == sorted(float(row["onset"]) for row in found)
-    assert list(found[0])[:2] == ["onset", "duration"]
-    (out,) = [row for row in found if row["excluded_reason"] == "manual:stumbled"]
+    result = rows(written(open_walk(edit))[f"{SUBJECT}_events.tsv"])
+    assert [float(row["onset"]) for row in result] == sorted(float(row["onset"]) for row in result)
+    assert list(result[0])[:2] == ["onset", "duration"]
+    (out,) = [row for row in result if row["excluded_reason"] == "manual:stumbled"]
     assert (out["trial_type"], out["side"], out["counted"]) == ("stride", cycle.side, "0")
     assert float(out["onset"]) == pytest.approx(cycle.start_s)
 
 
 def test_nobody_is_named_and_great_age_is_not_told() -> None:
-    told = VisitFacts(
+    notices = VisitFacts(
         "a b-7", "Mueller 1931", "v/1", "2026-03-02", age_years=94, sex="male", condition="comfortable pace"
     )
-    files = written(replace(open_walk(), visit=told))
+    files = written(replace(open_walk(), visit=notices))
     (person,) = rows(files["participants.tsv"])
     assert (person["participant_id"], person["age"], person["sex"]) == ("sub-ab7", "89+", "M")
     everything = b" ".join([*files.values(), *(name.encode() for name in files)])

@@ -26,11 +26,11 @@ ezc3d = pytest.importorskip("ezc3d", reason="the extra c3d is not installed")
 
 def opened(content: ExportContent, folder: Path) -> dict[str, Any]:
     archive = zipfile.ZipFile(io.BytesIO(c3d.write_c3d(content)))
-    found = {}
+    result = {}
     for name in archive.namelist():
         (folder / name).write_bytes(archive.read(name))
-        found[name] = ezc3d.c3d(str(folder / name))
-    return found
+        result[name] = ezc3d.c3d(str(folder / name))
+    return result
 
 
 def test_markers_angles_and_events_are_read_back(tmp_path: Path) -> None:
@@ -98,11 +98,11 @@ def test_a_long_take_comes_in_parts_that_hold_every_event(tmp_path: Path) -> Non
     parts = opened(replace(content, bundle=many), tmp_path)
     assert list(parts) == ["walk-1.c3d", "walk-2.c3d", "walk-3.c3d"]
     assert sum(p["data"]["points"].shape[2] for p in parts.values()) == 1200
-    told = []
+    notices = []
     for part in parts.values():
         minutes, seconds = part["parameters"]["EVENT"]["TIMES"]["value"]
-        told += (60.0 * minutes + seconds + part["parameters"]["SAGITTAL"]["START_S"]["value"][0]).tolist()
-    assert told == pytest.approx([e.time_s for e in many.events.events], abs=1e-4)
+        notices += (60.0 * minutes + seconds + part["parameters"]["SAGITTAL"]["START_S"]["value"][0]).tolist()
+    assert notices == pytest.approx([e.time_s for e in many.events.events], abs=1e-4)
     t_s = np.arange(3 * c3d.FRAMES) / 100.0
     assert [b - a for a, b in c3d.find_parts(len(t_s), t_s, ())] == [c3d.FRAMES] * 3
 

@@ -42,13 +42,13 @@ def codes(value: Any) -> set[str]:
 @pytest.mark.slow
 def test_the_bundle_is_valid_whole_and_holds_every_value() -> None:
     content = open_walk()
-    found = resources(content)
-    assert set(references(list(found.values()))) <= set(found)
-    (system,) = [r for r in found.values() if r["resourceType"] == "CodeSystem"]
-    assert codes([r for r in found.values() if r is not system]) <= {c["code"] for c in system["concept"]}
-    (report,) = [r for r in found.values() if r["resourceType"] == "DiagnosticReport"]
-    panel = found[report["result"][0]["reference"]]
-    members = [found[m["reference"]] for m in panel["hasMember"]]
+    result = resources(content)
+    assert set(references(list(result.values()))) <= set(result)
+    (system,) = [r for r in result.values() if r["resourceType"] == "CodeSystem"]
+    assert codes([r for r in result.values() if r is not system]) <= {c["code"] for c in system["concept"]}
+    (report,) = [r for r in result.values() if r["resourceType"] == "DiagnosticReport"]
+    panel = result[report["result"][0]["reference"]]
+    members = [result[m["reference"]] for m in panel["hasMember"]]
     assert len(members) == len(content.bundle.parameters)
     for member, p in zip(members, content.bundle.parameters, strict=True):
         assert member["code"]["coding"][0] == {
@@ -66,10 +66,10 @@ def test_the_bundle_is_valid_whole_and_holds_every_value() -> None:
 
 
 def test_it_tells_a_pseudonym_a_day_and_that_nobody_signed() -> None:
-    found = resources(open_walk()).values()
-    (patient,) = [r for r in found if r["resourceType"] == "Patient"]
+    values = resources(open_walk()).values()
+    (patient,) = [r for r in values if r["resourceType"] == "Patient"]
     assert set(patient) == {"resourceType", "identifier", "gender"}
-    for r in found:
+    for r in values:
         if r["resourceType"] in ("Observation", "DiagnosticReport"):
             assert (r["status"], r["effectiveDateTime"]) == ("preliminary", "2026-03-02")
 
@@ -79,9 +79,9 @@ def test_the_signed_report_is_attached_and_makes_its_own_numbers_final() -> None
     page, paper = "<p>Unterschrieben: Gänge</p>".encode(), b"%PDF-1.7"
     documents = (("application/pdf", paper), ("text/html", page))
     signed = SignedForm(2, "de", "Therapist 1", "2026-03-03T10:00:00+00:00", True, documents)
-    found = resources(replace(open_walk(), signed=signed)).values()
-    (report,) = [r for r in found if r["resourceType"] == "DiagnosticReport"]
-    assert {r["status"] for r in found if "status" in r and "subject" in r} == {"final"}
+    values = resources(replace(open_walk(), signed=signed)).values()
+    (report,) = [r for r in values if r["resourceType"] == "DiagnosticReport"]
+    assert {r["status"] for r in values if "status" in r and "subject" in r} == {"final"}
     assert report["resultsInterpreter"] == [{"display": "Therapist 1"}]
     for form, (media_type, content) in zip(report["presentedForm"], documents, strict=True):
         assert (form["contentType"], form["size"], form["language"]) == (media_type, len(content), "de")

@@ -18,5 +18,5 @@ def test_what_cannot_be_written_says_why() -> None:
     edit, _ = left_out()
     with pytest.raises(FormatError, match=r"no tracks\.parquet"):
         open_walk(edit, files=files)
-    alone = open_walk(files={"analysis.json": analysed.files()["analysis.json"]})
-    assert tables(alone)["strides_long.csv"] == []
+    single = open_walk(files={"analysis.json": analysed.files()["analysis.json"]})
+    assert tables(single)["strides_long.csv"] == []

@@ -28,11 +28,11 @@ def read_motion(data: bytes) -> dict[str, Floats]:
     """As OpenSim reads: name, keys until endheader, one row of tab-separated labels, rows of numbers."""
     lines = data.decode().split("\n")
     end = lines.index("endheader")
-    said = dict(line.split("=") for line in lines[1:end])
+    mapping = dict(line.split("=") for line in lines[1:end])
     names, body = lines[end + 1].split("\t"), [line.split("\t") for line in lines[end + 2 : -1]]
     assert lines[0] == "Coordinates"
-    assert (said["inDegrees"], lines[-1]) == ("yes", "")
-    assert (int(said["nRows"]), int(said["nColumns"])) == (len(body), len(names))
+    assert (mapping["inDegrees"], lines[-1]) == ("yes", "")
+    assert (int(mapping["nRows"]), int(mapping["nColumns"])) == (len(body), len(names))
     table = np.array(body, np.float64)
     assert names[0] == "time"
     assert (np.diff(table[:, 0]) > 0.0).all()
@@ -40,7 +40,7 @@ def read_motion(data: bytes) -> dict[str, Floats]:
 
 
 def moved(seed: int) -> dict[Segment, Floats]:
-    """Segments of somebody who turns and bends at random, smoothly; knees and ankles are hinges."""
+    """Randomly and smoothly moving segments with hinged knees and ankles."""
     t, rng = np.arange(200) / 50.0, np.random.default_rng(seed)
 
     def swing(size: float) -> Floats:
@@ -59,24 +59,24 @@ def moved(seed: int) -> dict[Segment, Floats]:
 
 def measure(q: dict[Segment, Floats]) -> JointAngles:
     tilt, obliquity = pelvis_angles(q["pelvis"])
-    found = {"pelvis_tilt": tilt, "pelvis_obliquity": obliquity}
+    result = {"pelvis_tilt": tilt, "pelvis_obliquity": obliquity}
     for side in SIDES:
         for joint, proximal, distal in list_leg_joints(side):
             parts = cardan_zxy(multiply(conjugate(q[proximal]), q[distal])).T
             for (name, right, left), part in zip(SIGNS[joint], parts, strict=True):
-                found[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * part
+                result[f"{name}_{SUFFIX[side]}"] = (right if side == "right" else left) * part
     n = len(tilt)
     oriented = SimpleNamespace(t_s=np.arange(n) / 50.0, q=q, valid=dict.fromkeys(q, np.ones(n, bool)))
-    return JointAngles(oriented.t_s, found, {}, headings=compute_headings(oriented))
+    return JointAngles(oriented.t_s, result, {}, headings=compute_headings(oriented))
 
 
 def test_the_models_axes_turned_by_the_coordinates_give_the_segments() -> None:
     """Axes of Rajagopal 2016: pelvis z, x, y; hip right z, x, y, left z, −x, −y; knee −z, ankle z."""
     q = moved(3)
-    found = {n: np.radians(x) for n, x in read_motion(write_motion(measure(q))).items()}
+    result = {n: np.radians(x) for n, x in read_motion(write_motion(measure(q))).items()}
     pelvis = multiply(
-        multiply(about(2, found["pelvis_tilt"]), about(0, found["pelvis_list"])),
-        about(1, found["pelvis_rotation"]),
+        multiply(about(2, result["pelvis_tilt"]), about(0, result["pelvis_list"])),
+        about(1, result["pelvis_rotation"]),
     )
     true = multiply(TO_GROUND, q["pelvis"])
     # the walk's first direction is free: only what stays the same all the time may differ
@@ -85,17 +85,17 @@ def test_the_models_axes_turned_by_the_coordinates_give_the_segments() -> None:
     assert np.ptp(angle_between(course, course[:1])) < 1e-6
     for side in SIDES:
         k, own = SUFFIX[side], 1.0 if side == "right" else -1.0
-        at = multiply(
-            multiply(about(2, found[f"hip_flexion_{k}"]), about(0, own * found[f"hip_adduction_{k}"])),
-            about(1, own * found[f"hip_rotation_{k}"]),
+        position = multiply(
+            multiply(about(2, result[f"hip_flexion_{k}"]), about(0, own * result[f"hip_adduction_{k}"])),
+            about(1, own * result[f"hip_rotation_{k}"]),
         )
         legs = [s for _, _, s in list_leg_joints(side)]
-        turns = [at, about(2, -found[f"knee_angle_{k}"]), about(2, found[f"ankle_angle_{k}"])]
-        here = pelvis
+        turns = [position, about(2, -result[f"knee_angle_{k}"]), about(2, result[f"ankle_angle_{k}"])]
+        place = pelvis
         for segment, turn in zip(legs, turns, strict=True):
-            here = multiply(here, turn)
-            wanted = multiply(conjugate(course[:1]), multiply(TO_GROUND, q[segment]))
-            assert angle_between(here, wanted).max() < 1e-6
+            place = multiply(place, turn)
+            expected = multiply(conjugate(course[:1]), multiply(TO_GROUND, q[segment]))
+            assert angle_between(place, expected).max() < 1e-6
 
 
 def test_lost_moments_and_joints_without_sensors_are_left_out() -> None:
@@ -103,9 +103,9 @@ def test_lost_moments_and_joints_without_sensors_are_left_out() -> None:
         {s: x for s, x in moved(1).items() if s != "foot_l"} | {"foot_l": np.full((200, 4), np.nan)}
     )
     angles.angles["hip_flexion_r"][50:60] = np.nan
-    found = read_motion(write_motion(angles))
-    assert "ankle_angle_l" not in found
-    assert len(found["time"]) == 190
+    motion = read_motion(write_motion(angles))
+    assert "ankle_angle_l" not in motion
+    assert len(motion["time"]) == 190
     with pytest.raises(FormatError, match="No joint angle"):
         write_motion(JointAngles(angles.t_s, {}, {}))
 
@@ -124,10 +124,10 @@ def test_orientations_are_read_back_and_standing_is_the_identity_in_opensim() ->
 def test_the_zip_holds_both_with_the_strides_and_only_worn_sensors() -> None:
     archive = zipfile.ZipFile(io.BytesIO(write_export("opensim", open_walk())))
     assert archive.namelist() == ["angles.mot", "orientations.sto", "strides.csv", "about.csv"]
-    found = read_motion(archive.read("angles.mot"))
+    motion = read_motion(archive.read("angles.mot"))
     angles = open_walk().bundle.angles
     assert angles is not None
-    assert found["knee_angle_l"] == pytest.approx(np.degrees(angles.angles["knee_flexion_l"]), abs=1e-5)
+    assert motion["knee_angle_l"] == pytest.approx(np.degrees(angles.angles["knee_flexion_l"]), abs=1e-5)
     assert list(read_orientation_table(archive.read("orientations.sto"), "o.sto").q) == [
         "pelvis_imu",
         "calcn_r_imu",

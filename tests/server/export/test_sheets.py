@@ -1,4 +1,4 @@
-"""The tables of an export, opened by what they are for; edits count in them."""
+"""Export tables read by their target programs, including edits."""
 
 from __future__ import annotations
 
@@ -33,50 +33,52 @@ def tables(content: ExportContent) -> dict[str, list[dict[str, str]]]:
 
 def test_long_and_wide_tables_hold_the_same_numbers_and_every_column_is_explained() -> None:
     content = open_walk()
-    found = tables(content)
-    wide = {row["cycle"]: row for row in found["strides_wide.csv"]}
-    long = found["strides_long.csv"]
+    result = tables(content)
+    wide = {row["cycle"]: row for row in result["strides_wide.csv"]}
+    long = result["strides_long.csv"]
     assert len(long) == sum(len(c.values) for c in content.cycles) > 0
     for row in long:
         assert row["value"] == wide[row["cycle"]][row["parameter"]]
         assert row["unit"] == CATALOGUE[row["parameter"]].unit
-    explained = {row["name"]: row for row in found["data_dictionary.csv"]}
-    asked = {name for n in ("strides_long.csv", "strides_wide.csv", "parameters.csv") for name in found[n][0]}
-    asked |= {row["parameter"] for n in ("strides_long.csv", "parameters.csv") for row in found[n]}
-    assert asked <= set(explained)
+    explained = {row["name"]: row for row in result["data_dictionary.csv"]}
+    requested_names = {
+        name for n in ("strides_long.csv", "strides_wide.csv", "parameters.csv") for name in result[n][0]
+    }
+    requested_names |= {row["parameter"] for n in ("strides_long.csv", "parameters.csv") for row in result[n]}
+    assert requested_names <= set(explained)
     assert explained["stride_time_s"]["definition"] == CATALOGUE["stride_time_s"].definition
 
 
 def test_a_stride_that_a_person_left_out_is_told_and_counts_in_no_mean() -> None:
     edit, content = left_out()
-    before, after = tables(open_walk()), tables(content)
-    rows = [row for row in after["strides_long.csv"] if row["excluded_reason"] == "manual:=stumbled"]
+    initial_tables, final_tables = tables(open_walk()), tables(content)
+    rows = [row for row in final_tables["strides_long.csv"] if row["excluded_reason"] == "manual:=stumbled"]
     assert {row["parameter"] for row in rows} == set(content.columns)
     assert {(row["side"], row["counted"]) for row in rows} == {(edit.side, "0")}
 
-    def n(found: dict[str, list[dict[str, str]]]) -> int:
+    def n(result: dict[str, list[dict[str, str]]]) -> int:
         return next(
             int(r["n"])
-            for r in found["parameters.csv"]
+            for r in result["parameters.csv"]
             if (r["parameter"], r["side"]) == ("stride_time_s", edit.side)
         )
 
-    assert n(after) == n(before) - 1
-    assert {r["what"]: r["value"] for r in after["about.csv"]}["edits"] == "1"
+    assert n(final_tables) == n(initial_tables) - 1
+    assert {r["what"]: r["value"] for r in final_tables["about.csv"]}["edits"] == "1"
 
 
 def test_an_angle_that_a_model_gives_is_told_beside_every_value() -> None:
     walk = open_walk()
     estimator = {**(walk.bundle.estimator or {}), "estimated_angles": ["knee_flexion_l"]}
-    found = tables(replace(walk, bundle=replace(walk.bundle, estimator=estimator)))
-    told = {(r["parameter"], r["side"]) for r in found["strides_long.csv"] if r["estimated"] == "1"}
-    assert ("knee_flexion_rom_deg", "left") in told
-    assert {(CATALOGUE[n].curve.variable, side) for n, side in told} == {("knee_flexion", "left")}  # type: ignore[union-attr]
-    assert {(r["side"], r["estimated_angles"]) for r in found["strides_wide.csv"]} == {
+    result = tables(replace(walk, bundle=replace(walk.bundle, estimator=estimator)))
+    notices = {(r["parameter"], r["side"]) for r in result["strides_long.csv"] if r["estimated"] == "1"}
+    assert ("knee_flexion_rom_deg", "left") in notices
+    assert {(CATALOGUE[n].curve.variable, side) for n, side in notices} == {("knee_flexion", "left")}  # type: ignore[union-attr]
+    assert {(r["side"], r["estimated_angles"]) for r in result["strides_wide.csv"]} == {
         ("left", "knee_flexion_l"),
         ("right", ""),
     }
-    about = {r["what"]: r["value"] for r in found["about.csv"]}
+    about = {r["what"]: r["value"] for r in result["about.csv"]}
     assert about["estimated_angles"] == "knee_flexion_l"
     assert about["verdict"] == numbers_of(walk.bundle).verdict[1]
 
@@ -88,19 +90,19 @@ def test_levels_from_the_anatomical_zero_are_those_from_standing_plus_what_was_r
     read = {"knee_flexion_l": 4.0, "knee_flexion_r": 3.0}
     entered = replace(walk.bundle.angles, standing_deg=read)
     content = replace(walk, bundle=replace(walk.bundle, angles=entered))
-    found = tables(content)
+    result = tables(content)
     standing, level = "knee_flexion_max_swing_deg", "knee_flexion_max_swing_anatomical_deg"
     for side, zero in (("left", 4.0), ("right", 3.0)):
         for table, value in (("parameters.csv", "mean"), ("strides_long.csv", "value")):
-            of = {
-                name: [r[value] for r in found[table] if (r["parameter"], r["side"]) == (name, side)]
+            by_name = {
+                name: [r[value] for r in result[table] if (r["parameter"], r["side"]) == (name, side)]
                 for name in (standing, level)
             }
-            assert len(of[standing]) == len(of[level]) > 0
-            for one, other in zip(of[standing], of[level], strict=True):
-                assert (one == "") == (other == "")
-                assert one == "" or abs(float(other) - float(one) - zero) < 1e-5
-    words = {r["name"]: r for r in found["data_dictionary.csv"]}[level]
+            assert len(by_name[standing]) == len(by_name[level]) > 0
+            for one, second in zip(by_name[standing], by_name[level], strict=True):
+                assert (one == "") == (second == "")
+                assert one == "" or abs(float(second) - float(one) - zero) < 1e-5
+    words = {r["name"]: r for r in result["data_dictionary.csv"]}[level]
     assert words["unit"] == "deg"
     assert words["label"].endswith(", anatomical")
     assert "from neutral (0°)" in words["definition"]

@@ -37,5 +37,5 @@ def test_a_zip_can_be_sent_while_it_is_written() -> None:
             sent.append(sink.take())
     sent.append(sink.take())
     assert all(sent)
-    found = zipfile.ZipFile(io.BytesIO(b"".join(sent)))
-    assert {name: found.read(name) for name in found.namelist()} == FILES
+    zip_file = zipfile.ZipFile(io.BytesIO(b"".join(sent)))
+    assert {name: zip_file.read(name) for name in zip_file.namelist()} == FILES

@@ -31,8 +31,8 @@ async def ask(
     size: int, method: str = "POST", path: str = "/api/v1/patients", *, declared: bool
 ) -> httpx.Response:
     async def pieces() -> AsyncIterator[bytes]:
-        for at in range(0, size, 1 << 16):
-            yield b"x" * min(1 << 16, size - at)
+        for position in range(0, size, 1 << 16):
+            yield b"x" * min(1 << 16, size - position)
 
     async with httpx.AsyncClient(transport=httpx.ASGITransport(BodyLimit(_measure))) as client:
         content = b"x" * size if declared else pieces()

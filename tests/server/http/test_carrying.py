@@ -27,18 +27,18 @@ async def answer(up: ServerConnection) -> None:
             await up.send(message if isinstance(message, bytes) else message[::-1])
 
 
-async def carry(*told: Any, stay: bool = True, **options: Any) -> list[dict[str, Any]]:
-    """What a client gets that says these things; `stay`: it then waits for the end, else it goes."""
+async def carry(*notices: Any, stay: bool = True, **options: Any) -> list[dict[str, Any]]:
+    """Response received by a client that sends these headers; with `stay` it waits for the end."""
     sent: list[dict[str, Any]] = []
     waiting: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
     waiting.put_nowait({"type": "websocket.connect"})
-    for one in told:
+    for one in notices:
         waiting.put_nowait({"type": "websocket.receive", "bytes" if isinstance(one, bytes) else "text": one})
 
     async def send(message: Any) -> None:
         sent.append(message)
         answers = sum(m["type"] == "websocket.send" for m in sent)
-        if not stay and answers == len(told):
+        if not stay and answers == len(notices):
             waiting.put_nowait({"type": "websocket.disconnect", "code": 1001})
 
     ws = WebSocket({"type": "websocket", "headers": [], "path": "/"}, waiting.get, send)

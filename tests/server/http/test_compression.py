@@ -1,4 +1,4 @@
-"""What a browser gets compressed, and what must come as it is."""
+"""Compressed and uncompressed responses."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Visit:
 
     @asynccontextmanager
     async def browser(self, **headers: str) -> AsyncIterator[httpx.AsyncClient]:
-        """Somebody signed in; httpx asks for gzip unless told otherwise."""
+        """Signed-in client; httpx requests gzip by default."""
         cookie = {"Cookie": f"sid={self.clinic.token('clinician')}"}
         async with httpx.AsyncClient(
             base_url=f"http://127.0.0.1:{self.port}",
@@ -129,9 +129,13 @@ async def test_a_part_of_a_file_is_a_part_of_the_file(visit: Visit) -> None:
 async def test_a_kept_sheet_is_asked_for_and_not_sent_again(visit: Visit) -> None:
     async with visit.browser() as client:
         tag = (await client.get(SHEET)).headers["etag"]
-        again = await client.get(SHEET, headers={"If-None-Match": tag})
+        second_response = await client.get(SHEET, headers={"If-None-Match": tag})
     assert tag.startswith('W/"')
-    assert (again.status_code, again.content, again.headers["vary"]) == (304, b"", "Accept-Encoding")
+    assert (second_response.status_code, second_response.content, second_response.headers["vary"]) == (
+        304,
+        b"",
+        "Accept-Encoding",
+    )
 
 
 async def test_what_another_site_asks_for_does_not_tell_by_its_length_what_is_in_it(visit: Visit) -> None:
@@ -151,14 +155,14 @@ async def test_the_head_of_an_answer_says_the_length_of_the_plain_one(visit: Vis
 
 
 async def test_the_first_part_of_a_page_is_readable_before_the_last_is_made() -> None:
-    rest = asyncio.Event()
+    event = asyncio.Event()
     parts = [b"<p>head" * 10, b"<p>body" * LONG_BYTES]
 
     async def page(scope: Scope, receive: Receive, send: Send) -> None:
         headers = [(b"content-type", b"text/html; charset=utf-8")]
         await send({"type": "http.response.start", "status": 200, "headers": headers})
         await send({"type": "http.response.body", "body": parts[0], "more_body": True})
-        await rest.wait()
+        await event.wait()
         await send({"type": "http.response.body", "body": parts[1]})
 
     reader = zlib.decompressobj(31)
@@ -169,7 +173,7 @@ async def test_the_first_part_of_a_page_is_readable_before_the_last_is_made() ->
     ):
         coming = answer.aiter_raw()
         assert reader.decompress(await asyncio.wait_for(anext(coming), SOON_S)) == parts[0]
-        rest.set()
+        event.set()
         assert b"".join([reader.decompress(part) async for part in coming]) == parts[1]
         assert reader.eof
 

@@ -132,8 +132,10 @@ async def test_pages_are_not_kept_by_caches_and_assets_are_checked_again(clinic:
         assert (await client.get("/api/v1/users")).headers["cache-control"] == "no-store"
         asset = await client.get("/static/css/base.css")
         assert asset.headers["cache-control"] == "no-cache"
-        again = await client.get("/static/css/base.css", headers={"If-None-Match": asset.headers["etag"]})
-    assert again.status_code == 304
+        second_response = await client.get(
+            "/static/css/base.css", headers={"If-None-Match": asset.headers["etag"]}
+        )
+    assert second_response.status_code == 304
 
 
 async def test_over_a_real_socket_a_foreign_origin_gets_403_before_accept(clinic: Clinic) -> None:

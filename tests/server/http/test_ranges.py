@@ -14,8 +14,8 @@ SIZE = len(CONTENT)
 
 
 def ask(content: bytes = CONTENT, **headers: str) -> Response:
-    said = {name.replace("_", "-"): value for name, value in headers.items()}
-    return answer_range(said, len(content), "v1", lambda a, b: content[a:b], "video/mp4")
+    message = {name.replace("_", "-"): value for name, value in headers.items()}
+    return answer_range(message, len(content), "v1", lambda a, b: content[a:b], "video/mp4")
 
 
 async def body_of(answer: Response) -> bytes:

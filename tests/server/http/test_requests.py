@@ -1,4 +1,4 @@
-"""What a log for machines has of each request."""
+"""Request lines of the JSON log."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Templates are made into Python once for a folder, and anew when anything of the pages changes."""
+"""Templates are compiled once per folder and again after any change of the pages."""
 
 from __future__ import annotations
 
@@ -63,26 +63,26 @@ def test_an_upgrade_below_a_running_process_is_not_mixed_with_what_it_has_read(
     running = templates.load_templates("en").env
     monkeypatch.setattr(templates, "fingerprint_pages", lambda: "of the next version")
     running.get_template(PAGE)
-    made: list[object] = []
+    result: list[object] = []
     compile_plainly = Environment.compile
 
-    def note(env: Environment, *given: Any, **others: Any) -> Any:
-        made.append(given)
-        return compile_plainly(env, *given, **others)
+    def note(env: Environment, *inputs: Any, **others: Any) -> Any:
+        result.append(inputs)
+        return compile_plainly(env, *inputs, **others)
 
     monkeypatch.setattr(Environment, "compile", note)
     templates.load_templates("en").env.get_template(PAGE)
-    assert made
+    assert result
 
 
 def test_what_makes_templates_is_a_part_of_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    before = templates.fingerprint_pages.__wrapped__()
+    initial = templates.fingerprint_pages.__wrapped__()
     for module in (templates, compiler):
         changed = tmp_path / "changed.py"
         changed.write_text(Path(module.__file__ or "").read_text("utf-8") + "\n")
-        with monkeypatch.context() as other:
-            other.setattr(module, "__file__", str(changed))
-            assert templates.fingerprint_pages.__wrapped__() != before
+        with monkeypatch.context() as second:
+            second.setattr(module, "__file__", str(changed))
+            assert templates.fingerprint_pages.__wrapped__() != initial
 
 
 def test_a_folder_that_is_a_file_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

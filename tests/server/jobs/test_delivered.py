@@ -23,7 +23,7 @@ PATIENCE_S = 60.0
 
 
 class Office:
-    """A queue whose table is looked at only when a delivery says so."""
+    """Queue whose table is read only after a delivery."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -49,12 +49,14 @@ class Office:
         return claim
 
     def listeners(self) -> set[int]:
-        said = "SELECT pid FROM pg_stat_activity WHERE datname = current_database() AND query LIKE 'LISTEN%'"
-        return {pid for (pid,) in run_sql(said, self.url)}
+        message = (
+            "SELECT pid FROM pg_stat_activity WHERE datname = current_database() AND query LIKE 'LISTEN%'"
+        )
+        return {pid for (pid,) in run_sql(message, self.url)}
 
-    def await_listeners(self, count: int, known: frozenset[int] = frozenset()) -> None:
+    def await_listeners(self, count: int, reference: frozenset[int] = frozenset()) -> None:
         limit = time.monotonic() + PATIENCE_S
-        while len(self.listeners() - known) < count:
+        while len(self.listeners() - reference) < count:
             assert time.monotonic() < limit
             time.sleep(0.05)
 
@@ -65,24 +67,24 @@ class Office:
 @pytest.fixture
 def office(postgres: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Office]:
     monkeypatch.setattr(delivered, "SLOW_POLL_S", NEVER_S)
-    with closing(Office(postgres)) as made:
-        yield made
+    with closing(Office(postgres)) as connection:
+        yield connection
 
 
 def test_idle_workers_are_told_of_jobs_and_a_busy_one_takes_no_delivery(office: Office) -> None:
-    before = office.submit("before anybody listened")
+    initial = office.submit("before anybody listened")
     with office.queue.listen() as wait:
-        assert office.wait_and_claim(wait).job_id == before
+        assert office.wait_and_claim(wait).job_id == initial
         with office.queue.listen() as wait_beside:
             office.await_listeners(2)
             second = office.submit("while the first works")
-            taken = office.wait_and_claim(wait_beside)
-            assert taken.job_id == second
+            selection = office.wait_and_claim(wait_beside)
+            assert selection.job_id == second
             assert office.undelivered() == 2  # held until their workers wait again
         office.await_listeners(1)
-        assert office.queue.release(taken)
-        again = office.wait_and_claim(wait)
-        assert (again.job_id, again.attempt) == (second, 2)
+        assert office.queue.release(selection)
+        repeat = office.wait_and_claim(wait)
+        assert (repeat.job_id, repeat.attempt) == (second, 2)
     assert office.undelivered() == 0
 
 
@@ -96,13 +98,13 @@ def test_a_job_that_was_not_committed_is_not_delivered(office: Office) -> None:
 def test_a_broken_line_is_mended(office: Office) -> None:
     with office.queue.listen() as wait:
         office.await_listeners(1)
-        known = frozenset(office.listeners())
+        reference = frozenset(office.listeners())
         run_sql(
             "SELECT pg_terminate_backend(pid) FROM pg_stat_activity "
             "WHERE datname = current_database() AND pid <> pg_backend_pid()",
             office.url,
         )
-        office.await_listeners(1, known)
+        office.await_listeners(1, reference)
         job_id = office.submit("after it")
         assert office.wait_and_claim(wait).job_id == job_id
 

@@ -28,21 +28,21 @@ def submit(db: Database, queue: TableQueue) -> JobView:
 def test_two_watchers_see_every_state_and_the_end(db: Database) -> None:
     queue = TableQueue(db, 15.0)
     feed = JobFeed(db)
-    seen: list[list[str]] = [[], []]
+    observations: list[list[str]] = [[], []]
 
-    async def watch(who: int, job_id: str) -> None:
+    async def watch(user: int, job_id: str) -> None:
         async for view in feed.watch(job_id):
-            seen[who].append(view.state)
+            observations[user].append(view.state)
 
     async def story() -> None:
         view = submit(db, queue)
         watchers = [asyncio.create_task(watch(i, view.id)) for i in range(2)]
-        await reached(lambda: all(s == ["queued"] for s in seen))
+        await reached(lambda: all(s == ["queued"] for s in observations))
         claim = queue.claim("w", ("k",))
         assert claim is not None
-        await reached(lambda: all(s[-1] == "running" for s in seen))
+        await reached(lambda: all(s[-1] == "running" for s in observations))
         queue.progress(claim, "angles", 0.5)
-        await reached(lambda: all(len(s) == 3 for s in seen))
+        await reached(lambda: all(len(s) == 3 for s in observations))
         queue.heartbeat(claim)  # changes nothing that people see
         queue.finish(claim, lambda c: None)
         await asyncio.gather(*watchers)
@@ -50,7 +50,7 @@ def test_two_watchers_see_every_state_and_the_end(db: Database) -> None:
         assert late == ["done"]
 
     asyncio.run(asyncio.wait_for(story(), 60))
-    assert seen == [["queued", "running", "running", "done"]] * 2
+    assert observations == [["queued", "running", "running", "done"]] * 2
 
 
 def test_a_watch_ends_when_the_job_is_erased_unknown_or_the_feed_closes(db: Database) -> None:
@@ -79,9 +79,9 @@ def test_a_watch_ends_when_the_job_is_erased_unknown_or_the_feed_closes(db: Data
     asyncio.run(asyncio.wait_for(story(), 60))
 
 
-async def collect(feed: JobFeed, job_id: str, seen: list[JobView]) -> None:
+async def collect(feed: JobFeed, job_id: str, observations: list[JobView]) -> None:
     async for view in feed.watch(job_id):
-        seen.append(view)  # noqa: PERF401 - filled while it is watched
+        observations.append(view)  # noqa: PERF401 - filled while it is watched
 
 
 async def reached(look: object) -> None:

@@ -37,7 +37,7 @@ class Clock:
 
 
 class Bench:
-    """A queue with a hand-driven clock and what has been published through it."""
+    """Queue with a controllable clock and its published results."""
 
     def __init__(self, source: Source) -> None:
         self.db = Database(source)
@@ -55,7 +55,7 @@ class Bench:
         return claim
 
     def claim_again(self, claim: Claim) -> Claim:
-        """What the next worker has after this one gave the job back."""
+        """Next worker's claim after this one returned the job."""
         assert self.queue.release(claim)
         return self.claim()
 
@@ -79,9 +79,9 @@ class Bench:
 
 @pytest.fixture
 def bench(source: Source) -> Iterator[Bench]:
-    made = Bench(source)
-    yield made
-    made.db.close()
+    result = Bench(source)
+    yield result
+    result.db.close()
 
 
 def test_the_same_key_is_one_job_until_it_fails(bench: Bench) -> None:
@@ -90,18 +90,18 @@ def test_the_same_key_is_one_job_until_it_fails(bench: Bench) -> None:
     claim = bench.claim()
     assert bench.submit("a").id == first.id
     bench.queue.fail(claim, "no_walking", "No walking.")
-    again = bench.submit("a")
-    assert again.id != first.id
+    repeat = bench.submit("a")
+    assert repeat.id != first.id
     assert bench.finish(bench.claim())
-    assert bench.submit("a").id == again.id
+    assert bench.submit("a").id == repeat.id
 
 
 def test_a_job_that_is_being_cancelled_does_not_answer_for_a_new_wish(bench: Bench) -> None:
     first = bench.submit("a")
     claim = bench.claim()
     bench.cancel(first.id)
-    again = bench.submit("a")
-    assert again.id != first.id
+    repeat = bench.submit("a")
+    assert repeat.id != first.id
     assert bench.queue.heartbeat(claim) is LeaseState.LOST
     assert not bench.finish(claim)
 
@@ -175,7 +175,7 @@ def test_every_write_of_a_lost_claim_is_refused(bench: Bench, taker: str) -> Non
     lost = bench.claim("one")
     bench.clock.advance(LEASE_S * 1.1)
     bench.claim(taker)
-    before = bench.queue.get(lost.job_id)
+    initial_response = bench.queue.get(lost.job_id)
     assert bench.queue.heartbeat(lost) is LeaseState.LOST
     assert not bench.queue.progress(lost, "angles", 0.5)
     assert not bench.finish(lost)
@@ -183,7 +183,7 @@ def test_every_write_of_a_lost_claim_is_refused(bench: Bench, taker: str) -> Non
     assert not bench.queue.stop(lost)
     assert not bench.queue.note_death(lost)
     assert not bench.queue.release(lost)
-    assert bench.queue.get(lost.job_id) == before
+    assert bench.queue.get(lost.job_id) == initial_response
     assert bench.published == []
 
 
@@ -243,9 +243,9 @@ def test_three_deaths_end_a_job_and_a_release_is_none(bench: Bench, way: str) ->
         else:
             assert bench.queue.note_death(claim)
     assert bench.queue.claim("w", ("k",)) is None
-    after = bench.queue.get(view.id)
-    assert after is not None
-    assert (after.state, after.error_code) == ("failed", "worker_died")
+    final_response = bench.queue.get(view.id)
+    assert final_response is not None
+    assert (final_response.state, final_response.error_code) == ("failed", "worker_died")
 
 
 def test_a_clock_set_back_an_hour_does_not_keep_a_dead_workers_job(bench: Bench) -> None:

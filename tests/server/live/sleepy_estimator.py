@@ -11,7 +11,7 @@ SLEEP_S = 0.6
 
 
 class Sleepy(Follower):
-    """Half a second behind, always."""
+    """Estimator that is always half a second late."""
 
     def step(self) -> None:
         """Sleep, then read."""

@@ -1,4 +1,4 @@
-"""The client of the live protocol against a running server: nothing is lost, everything is said."""
+"""Live client against a running server: no data loss, complete messages."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def hello(v: Visit) -> Hello:
 def recorded(clinic: Clinic, v: Visit) -> list[bytes]:
     """The batches of the recording that the take has become."""
     with clinic.db.read() as c:
-        made = recordings.require_current(c, v.session)
-    (file,) = made.files
-    return kept_in(clinic.app.state.blobs.read(made.patient_id, file.sha256))
+        current = recordings.require_current(c, v.session)
+    (file,) = current.files
+    return kept_in(clinic.app.state.blobs.read(current.patient_id, file.sha256))
 
 
 @pytest.mark.slow
@@ -131,9 +131,9 @@ async def test_a_take_that_the_therapist_ends_is_said(clinic: Clinic, port: int)
     assert refused.value.code == "take_ended"
     with clinic.db.read() as c:
         assert live.get(c, v.take).state == "closed"
-    kept = recorded(clinic, v)
-    assert len(report.ack_s) <= len(kept)
-    assert kept == [frame(i) for i in range(len(kept))]
+    stored_recording = recorded(clinic, v)
+    assert len(report.ack_s) <= len(stored_recording)
+    assert stored_recording == [frame(i) for i in range(len(stored_recording))]
 
 
 async def test_a_take_of_another_sender_is_not_continued(clinic: Clinic, port: int) -> None:

@@ -1,4 +1,4 @@
-"""Sensors of a followed take are compared behind all that a batch has to say, and what is found is told."""
+"""Sensor comparison of a live trial runs after all other output of a batch, and its findings are reported."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ FEET: dict[Segment | None, Segment] = {"foot_l": "foot_r", "foot_r": "foot_l"}
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A take whose feet were exchanged."""
-    made = simulate_scenario("comfortable", 3).recording
-    wrong = replace(made, segments={d: FEET.get(s, s) for d, s in made.segments.items()})
+    recording = simulate_scenario("comfortable", 3).recording
+    wrong = replace(recording, segments={d: FEET.get(s, s) for d, s in recording.segments.items()})
     path = tmp_path_factory.mktemp("log") / "take"
     path.write_bytes(send([shared(wrong)]).log())
     return path
@@ -34,8 +34,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_sensors_are_compared_when_strides_and_cues_are_out(
     log: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said: list[Report] = []
-    told: list[tuple[int, int]] = []  # strides of the frames so far, and those said of them
+    message: list[Report] = []
+    messages: list[tuple[int, int]] = []  # strides of the frames so far, and those said of them
     strides = 0
     push, compare = OnlineSession.push, OnlineSession.compare_sensors
 
@@ -46,20 +46,20 @@ def test_sensors_are_compared_when_strides_and_cues_are_out(
         return frame
 
     def compared(online: OnlineSession) -> list[Notice]:
-        told.append((strides, sum(isinstance(x, FeedItem) and x.kind == "stride" for x in said)))
+        messages.append((strides, sum(isinstance(x, FeedItem) and x.kind == "stride" for x in message)))
         return compare(online)
 
     monkeypatch.setattr(OnlineSession, "push", pushed)
     monkeypatch.setattr(OnlineSession, "compare_sensors", compared)
     follower = Follower(
-        FollowTake("take", str(log), log.stat().st_size, 1.75, "walk", None, None, []), said.append
+        FollowTake("take", str(log), log.stat().st_size, 1.75, "walk", None, None, []), message.append
     )
     while follower.has_work:
         follower.step()
     follower.close()
     assert strides > 20
-    assert all(expected == out for expected, out in told)
-    notices = [msgspec.json.decode(x.body) for x in said if isinstance(x, FeedItem) and x.kind == "notice"]
-    (found,) = [x for x in notices if x["code"] == "sensors_exchanged"]
-    assert found["sensor"] == "foot_l"
-    assert "left foot with right foot" in found["text"]
+    assert all(expected == out for expected, out in messages)
+    notices = [msgspec.json.decode(x.body) for x in message if isinstance(x, FeedItem) and x.kind == "notice"]
+    (result,) = [x for x in notices if x["code"] == "sensors_exchanged"]
+    assert result["sensor"] == "foot_l"
+    assert "left foot with right foot" in result["text"]

@@ -47,8 +47,8 @@ async def test_the_whole_client_streams_a_take(clinic: Clinic, port: int) -> Non
 
 
 def test_the_bytes_of_the_example_are_a_batch() -> None:
-    (shown,) = [body for _, body in BLOCKS if body.startswith("53474c31")]
-    batch = decode_batch(bytes.fromhex("".join(shown.split())))
+    (view,) = [body for _, body in BLOCKS if body.startswith("53474c31")]
+    batch = decode_batch(bytes.fromhex("".join(view.split())))
     assert (batch.stream, batch.seq, batch.t0_us, batch.sent_us) == (0, 0, 1_000_000, 1_012_000)
     np.testing.assert_array_equal(
         batch.samples, np.array([[[0, 0, 9.81, 0, 0, 0.5, np.nan, np.nan, np.nan]]], np.float32)
@@ -56,18 +56,18 @@ def test_the_bytes_of_the_example_are_a_batch() -> None:
 
 
 def test_the_hello_of_the_example_is_one() -> None:
-    (shown,) = [body for _, body in BLOCKS if '"type": "hello"' in body and body.startswith("{")]
-    hello = parse_hello(shown)
+    (view,) = [body for _, body in BLOCKS if '"type": "hello"' in body and body.startswith("{")]
+    hello = parse_hello(view)
     assert [s.clock for s in hello.streams] == ["own", "own"]
-    assert json.loads(shown)["token"]
+    assert json.loads(view)["token"]
 
 
 def test_every_close_code_is_in_the_table_with_whether_to_come_back() -> None:
     table = TEXT.split("## Close codes")[1].split("\n## ")[0]
     rows = re.findall(r"^\| (\d{4}) \| .* \| (no|yes)\b", table, re.MULTILINE)
-    said = {int(code): back for code, back in rows}
-    assert set(said) == set(CloseCode)
-    assert {code for code, back in said.items() if back == "no"} == FINAL | {CloseCode.DONE}
+    message = {int(code): back for code, back in rows}
+    assert set(message) == set(CloseCode)
+    assert {code for code, back in message.items() if back == "no"} == FINAL | {CloseCode.DONE}
 
 
 def test_the_log_begins_as_described() -> None:

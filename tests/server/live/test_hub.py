@@ -1,4 +1,4 @@
-"""Streaming, estimating and watching at once: nothing waits for anything else, nothing is told twice."""
+"""Concurrent streaming, estimating and watching: no blocking, no repeated messages."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def hub_of(clinic: Clinic) -> Hub:
 
 
 def prescribed(clinic: Clinic) -> str:
-    """A session of somebody who trains."""
+    """Session of a patient with a prescription."""
     session = new_session(clinic)
     with clinic.db.write() as c:
         patient = sessions.get(c, session).patient_id
@@ -87,7 +87,7 @@ def prescribed(clinic: Clinic) -> str:
 
 
 async def given(frames: Sequence[bytes], gates: Sequence[asyncio.Event]) -> AsyncIterator[bytes]:
-    """Batches as fast as they are taken, in equal parts with a gate after each but the last."""
+    """Batches sent as fast as accepted, in equal parts with a gate after each but the last."""
     parts = len(gates) + 1
     for i, one in enumerate(frames):
         yield one
@@ -146,7 +146,7 @@ def cue_rows(clinic: Clinic, take: str) -> list[dict[str, Any]]:
 
 
 async def drained(clinic: Clinic, take: str) -> None:
-    """Wait until the estimator has told everything and it is written."""
+    """Wait until the estimator's output is complete and stored."""
     async with asyncio.timeout(20):
         while hub_of(clinic).pool.follows(take):
             await asyncio.sleep(0.05)
@@ -155,8 +155,8 @@ async def drained(clinic: Clinic, take: str) -> None:
 
 def bytes_of(clinic: Clinic, session: str) -> bytes:
     with clinic.db.read() as c:
-        made = recordings.require_current(c, session)
-    content: bytes = clinic.app.state.blobs.read(made.patient_id, made.files[0].sha256)
+        current = recordings.require_current(c, session)
+    content: bytes = clinic.app.state.blobs.read(current.patient_id, current.files[0].sha256)
     return content
 
 
@@ -175,18 +175,18 @@ async def test_what_was_told_live_is_what_the_recording_says_commands_and_a_kill
         await v.command("mark", "shoes changed")
         gates[0].set()
         await page.until(lambda p: p.of("cue")[-1]["why_not"] == "off")
-        before = len(page.of("cue"))
+        initial_count = len(page.of("cue"))
         for pid in hub_of(clinic).pool.pids:
             os.kill(pid, signal.SIGKILL)
         await page.until(lambda p: any("starts again" in n["text"] for n in p.of("notice")))
-        seen = len(page.messages)
+        count = len(page.messages)
         gates[1].set()
-        await page.until(lambda p: any(m["type"] == "frame" for m in p.messages[seen:]))
+        await page.until(lambda p: any(m["type"] == "frame" for m in p.messages[count:]))
         await v.command("feedback", True)
         gates[2].set()
         assert (await task).recording
         numbers = [cue["n"] for cue in page.of("cue")]
-        assert len(numbers) == len(set(numbers)) >= before > 0
+        assert len(numbers) == len(set(numbers)) >= initial_count > 0
         await drained(clinic, v.take)
     rows = cue_rows(clinic, v.take)
     log = tmp_path / "take.log"
@@ -197,9 +197,9 @@ async def test_what_was_told_live_is_what_the_recording_says_commands_and_a_kill
         Command(v.take, e.content["before"], e.kind, e.content["value"]) for e in events if e.kind in STEERING
     ]
     training = next(dict(e.content) for e in events if e.kind == "prescription")
-    said = items(replayed(log, training=training, commands=commands), "cue")
+    message = items(replayed(log, training=training, commands=commands), "cue")
     assert [Cue.from_json(row) for row in rows] == [
-        Cue.from_json(msgspec.json.decode(one.body)) for one in said
+        Cue.from_json(msgspec.json.decode(one.body)) for one in message
     ]
     assert {cue["why_not"] for cue in rows} >= {"off"}
     assert [e.content["value"] for e in events if e.kind == "mark"] == ["shoes changed"]
@@ -266,7 +266,7 @@ async def test_a_stopped_estimator_delays_no_acknowledgement(estimating: tuple[C
         async with watching(v) as page:
             task = streaming(v, frames[:60])
             await page.until(lambda p: p.of("frame"))
-            alone = await task
+            single = await task
         async with contextlib.AsyncExitStack() as stack:
             w = await stack.enter_async_context(visit(clinic, port))
             for pid in pool.pids:
@@ -277,7 +277,7 @@ async def test_a_stopped_estimator_delays_no_acknowledgement(estimating: tuple[C
                 for pid in pool.pids:
                     os.kill(pid, signal.SIGCONT)
     assert len(report.ack_s) == 400
-    assert report.ack_quantile(0.99) < max(1.0, 3 * alone.ack_quantile(0.99))
+    assert report.ack_quantile(0.99) < max(1.0, 3 * single.ack_quantile(0.99))
 
 
 @pytest.mark.slow
@@ -304,15 +304,15 @@ async def test_a_server_that_starts_again_waits_for_the_tablet_and_tells_no_cue_
     first = cue_rows_of(tmp_path, clinic, take)
     assert first
     async with open_clinic(tmp_path, live_workers=1) as clinic, serve(clinic.app) as port:
-        again = Visit(clinic, port, session, take, token, v.http)
+        second = Visit(clinic, port, session, take, token, v.http)
         standing = hub_of(clinic).take_of(session)
         assert standing is not None
         assert standing.standing()["tablet"] == "lost"
         assert standing.standing()["count"] == sent
         assert [m.value for m in standing.steered.marks] == ["before"]
-        async with again.feed("admin") as feed:
+        async with second.feed("admin") as feed:
             watcher = Watcher(feed)
-            async with again.tablet(hello) as ws:
+            async with second.tablet(hello) as ws:
                 assert (await heard(ws, "welcome"))["next_seq"] == sent
                 for one in frames[sent : sent + 60]:
                     await ws.send(one)
@@ -372,8 +372,8 @@ async def test_a_crash_while_the_take_becomes_a_recording_is_repaired_at_the_nex
     content = log.read_bytes()
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         with clinic.db.read() as c:
-            made = recordings.require_current(c, v.session)
-            assert live.get(c, v.take).recording_id == made.id
+            current = recordings.require_current(c, v.session)
+            assert live.get(c, v.take).recording_id == current.id
         assert bytes_of(clinic, v.session) == content
     assert not log.exists()
 
@@ -386,8 +386,8 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
         whole += record("B", due.frame)
     good.write_bytes(whole)
     bad.write_bytes(b"no log at all" * 100)
-    said: list[Told] = []
-    estimator = EstimatorWorker(said.append)
+    message: list[Told] = []
+    estimator = EstimatorWorker(message.append)
     for name, path in (("good", good), ("bad", bad)):
         estimator.obey(FollowTake(name, str(path), 0, 1.75, "walk", None, None, []))
     estimator.obey(FollowTake("gone", str(tmp_path / "gone.log"), 0, 1.75, "walk", None, None, []))
@@ -395,11 +395,11 @@ def test_a_take_that_throws_is_told_and_leaves_the_others_alone(tmp_path: Path) 
     while estimator.has_work:
         estimator.work()
     estimator.obey(ForgetTake("good"))
-    broken = {s.take: s.code for s in said if isinstance(s, EstimateFailed)}
+    broken = {s.take: s.code for s in message if isinstance(s, EstimateFailed)}
     assert broken == {"gone": "live_log_gone", "bad": "live_estimate_failed"}
-    shown = [s for s in said if isinstance(s, Picture)]
-    assert {s.take for s in shown} == {"good"}
-    assert not [s for s in said if isinstance(s, FeedItem) and s.take != "good"]
+    view = [s for s in message if isinstance(s, Picture)]
+    assert {s.take for s in view} == {"good"}
+    assert not [s for s in message if isinstance(s, FeedItem) and s.take != "good"]
     estimator.obey(Command("bad", 0, "pause", True))  # of a take that was given up: nothing to do
 
 
@@ -411,11 +411,11 @@ def test_a_take_without_a_mapped_sensor_is_told_why_it_cannot_be_estimated(tmp_p
     log = tmp_path / "take.log"
     whole = FILE_MARK + record("H", hello_json(replace(hello, streams=(replace(stream_, sensors=nothing),))))
     log.write_bytes(whole + record("B", walk()[0].frame))
-    said: list[Told] = []
-    estimator = EstimatorWorker(said.append)
+    message: list[Told] = []
+    estimator = EstimatorWorker(message.append)
     estimator.obey(FollowTake("one", str(log), log.stat().st_size, None, "walk", None, None, []))
     estimator.work()
-    (only,) = said
+    (only,) = message
     assert isinstance(only, EstimateFailed)
     assert only.code == "no_mapping"
     assert not estimator.has_work

@@ -1,4 +1,4 @@
-"""What the estimator tells is written together, in its order, and is not lost where the disk refuses."""
+"""Estimator output is written in groups, in order, and kept when the disk refuses writes."""
 
 from __future__ import annotations
 
@@ -81,10 +81,10 @@ def test_what_a_busy_database_refuses_is_written_later_before_what_came_meanwhil
     _, take = open_take(db)
     with closing(Database(tmp_path / "a.db")) as mine:
         journal = Journal(mine)
-        told = DiskLog.note_refusal
+        note_refusal = DiskLog.note_refusal
 
-        def tell(disk: DiskLog, error: BaseException, what: str) -> None:
-            told(disk, error, what)
+        def tell(disk: DiskLog, error: BaseException, label: str) -> None:
+            note_refusal(disk, error, label)
             journal.add(take, "notice", 2.0, {})
 
         monkeypatch.setattr(DiskLog, "note_refusal", tell)

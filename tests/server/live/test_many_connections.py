@@ -1,4 +1,4 @@
-"""Tablets that come and go in every way leave nothing behind in the server."""
+"""Disconnecting tablets leave no resources behind in the server."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def descriptors() -> int:
     return len(list(Path("/proc/self/fd").iterdir()))
 
 
-async def come_and_go(v: Visit, how: str) -> None:
+async def come_and_go(v: Visit, mode: str) -> None:
     async with connect(v.socket, compression=None, proxy=None) as ws:
-        match how:
+        match mode:
             case "silent":
                 ws.transport.abort()
             case "hello, then gone":
@@ -61,8 +61,8 @@ async def test_connections_that_come_and_go_leave_no_descriptor_and_no_task(
     clinic: Clinic, port: int
 ) -> None:
     async with visit(clinic, port) as v:
-        for how in GOES:  # what is loaded or opened at the first time
-            await come_and_go(v, how)
+        for mode in GOES:  # what is loaded or opened at the first time
+            await come_and_go(v, mode)
         async with asyncio.timeout(20):
             while (await v.state())["tablet"] != "lost":
                 await asyncio.sleep(0.05)

@@ -41,16 +41,16 @@ def as_sent(x: Floats | None) -> Floats | None:
 @pytest.mark.parametrize("per_batch", [1, 7, 10, 1000])
 def test_a_walk_comes_back_sample_by_sample(per_batch: int) -> None:
     walk = simulate_scenario("comfortable", 3).recording
-    again = read_live_log(log_of(walk, cut(walk, per_batch)), "t")
-    assert list(again.streams) == [d for d, s in walk.segments.items() if s is not None]
+    second = read_live_log(log_of(walk, cut(walk, per_batch)), "t")
+    assert list(second.streams) == [d for d, s in walk.segments.items() if s is not None]
     first = min(s.t_s[0] for s in walk.streams.values())
-    for device, stream in again.streams.items():
-        before = walk.streams[device]
-        kept = np.isfinite(stream.acc).all(axis=1)
-        np.testing.assert_allclose(stream.t_s[kept], before.t_s - first, atol=1e-6)
-        np.testing.assert_array_equal(stream.acc[kept], as_sent(before.acc))
-        np.testing.assert_array_equal(stream.gyr[kept], as_sent(before.gyr))  # type: ignore[index]
-        assert again.segments[device] == walk.segments[device]
+    for device, stream in second.streams.items():
+        initial_streams = walk.streams[device]
+        stored_mask = np.isfinite(stream.acc).all(axis=1)
+        np.testing.assert_allclose(stream.t_s[stored_mask], initial_streams.t_s - first, atol=1e-6)
+        np.testing.assert_array_equal(stream.acc[stored_mask], as_sent(initial_streams.acc))
+        np.testing.assert_array_equal(stream.gyr[stored_mask], as_sent(initial_streams.gyr))  # type: ignore[index]
+        assert second.segments[device] == walk.segments[device]
 
 
 @pytest.mark.recorded
@@ -58,8 +58,10 @@ def test_a_real_walk_gives_the_same_signals_on_the_axis_as_its_file() -> None:
     walk = neura_recording()
     batches = cut(walk, 10)
     assert [one.at_s for one in batches] == sorted(one.at_s for one in batches)
-    again = replace(read_live_log(log_of(walk, batches), "t"), subject=walk.subject, protocol=walk.protocol)
-    ours, theirs = synchronise(again), synchronise(walk)
+    second_variant = replace(
+        read_live_log(log_of(walk, batches), "t"), subject=walk.subject, protocol=walk.protocol
+    )
+    ours, theirs = synchronise(second_variant), synchronise(walk)
     np.testing.assert_array_equal(ours.t_s, theirs.t_s)
     for segment, sensor in theirs.sensors.items():
         np.testing.assert_array_equal(ours.sensors[segment].acc, as_sent(sensor.acc))
@@ -82,12 +84,12 @@ def test_sensors_of_unequal_rates_and_irregular_times_become_streams_of_their_ow
     assert [[x.id for x in s.sensors] for s in streams] == [["a", "c"], ["b"], ["d"]]
     batches = cut(recording, 16)
     assert [decode_batch(one.frame).seq for one in batches] == list(range(len(batches)))
-    again = read_live_log(log_of(recording, batches), "t")
-    for device, before in recording.streams.items():
-        kept = np.isfinite(again.streams[device].acc).all(axis=1)
-        np.testing.assert_allclose(again.streams[device].t_s[kept], before.t_s - 10.0, atol=1.1e-6)
-        np.testing.assert_array_equal(again.streams[device].acc[kept], before.acc)
-    assert again.streams["c"].gyr is None
+    second = read_live_log(log_of(recording, batches), "t")
+    for device, initial in recording.streams.items():
+        stored_mask = np.isfinite(second.streams[device].acc).all(axis=1)
+        np.testing.assert_allclose(second.streams[device].t_s[stored_mask], initial.t_s - 10.0, atol=1.1e-6)
+        np.testing.assert_array_equal(second.streams[device].acc[stored_mask], initial.acc)
+    assert second.streams["c"].gyr is None
 
 
 def test_a_hole_in_all_sensors_is_not_sent() -> None:
@@ -101,9 +103,9 @@ def test_a_hole_in_all_sensors_is_not_sent() -> None:
 
 def test_only_sensors_with_a_place_are_sent_if_any_has_one() -> None:
     t = np.arange(100) / 50.0
-    both = Recording({"a": imu("a", t), "b": imu("b", t[1:])}, segments={"b": "pelvis", "a": None})
-    assert [x.id for x in parse_hello(hello_json(hello_of(both, "t"))).sensors] == ["b"]
-    neither = replace(both, segments={})
+    pair = Recording({"a": imu("a", t), "b": imu("b", t[1:])}, segments={"b": "pelvis", "a": None})
+    assert [x.id for x in parse_hello(hello_json(hello_of(pair, "t"))).sensors] == ["b"]
+    neither = replace(pair, segments={})
     assert [x.id for x in hello_of(neither, "t").sensors] == ["a", "b"]
 
 

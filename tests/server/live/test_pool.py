@@ -1,4 +1,4 @@
-"""Which estimator process follows which take, and what each of them is told; the test plays the processes."""
+"""Assignment of trials to estimator processes and their messages; the test plays the processes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Child:
 
 @dataclass
 class Stage:
-    """A pool and what it tells."""
+    """Pool with its notices."""
 
     pool: EstimatorPool
     lines: asyncio.Queue[socket.socket]
@@ -61,9 +61,9 @@ class Stage:
 
     async def child(self) -> Child:
         async with asyncio.timeout(10):
-            made = Child(*await asyncio.open_connection(sock=await self.lines.get()))
-        self.children.append(made)
-        return made
+            result = Child(*await asyncio.open_connection(sock=await self.lines.get()))
+        self.children.append(result)
+        return result
 
 
 @asynccontextmanager
@@ -103,24 +103,27 @@ async def test_takes_go_to_the_process_with_the_fewest_and_stay_there(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async with opened(monkeypatch, 2) as stage:
-        pool, one, other = stage.pool, await stage.child(), await stage.child()
+        pool, one, alternative = stage.pool, await stage.child(), await stage.child()
         assert stage.lines.empty()
         assert len(set(pool.pids)) == 2
         for take in "abc":
             pool.follow(take)
-        heard = [await one.hear(), await one.hear(), await other.hear()]
+        heard = [await one.hear(), await one.hear(), await alternative.hear()]
         assert [o.take for o in heard if isinstance(o, FollowTake)] == ["a", "c", "b"]
         pool.follow("b")  # again, from the start
-        again = await other.hear()
-        assert isinstance(again, FollowTake)
-        assert again.take == "b"
+        repeat = await alternative.hear()
+        assert isinstance(repeat, FollowTake)
+        assert repeat.take == "b"
         pool.send(Command("b", 3, "pause", True))
         pool.send(Command("unknown", 3, "pause", True))
         pool.leave("b")
-        assert [await other.hear(), await other.hear()] == [Command("b", 3, "pause", True), ForgetTake("b")]
+        assert [await alternative.hear(), await alternative.hear()] == [
+            Command("b", 3, "pause", True),
+            ForgetTake("b"),
+        ]
         assert [pool.follows(t) for t in "abc"] == [True, False, True]
         pool.follow("d")
-        new = await other.hear()
+        new = await alternative.hear()
         assert isinstance(new, FollowTake)
         assert new.take == "d"
 
@@ -135,9 +138,9 @@ async def test_of_a_growing_log_only_the_newest_length_counts(monkeypatch: pytes
         pool.grow("b", 5)
         pool.grow("unknown", 1)
         await child.hear(), await child.hear()
-        told = await child.hear()
-        assert isinstance(told, LogGrown)
-        assert told.sizes == {"a": 30, "b": 5}
+        notices = await child.hear()
+        assert isinstance(notices, LogGrown)
+        assert notices.sizes == {"a": 30, "b": 5}
         pool.grow("a", 40)
         pool.send(Command("a", 0, "start"))  # what was measured before comes before
         first, second = await child.hear(), await child.hear()
@@ -147,14 +150,14 @@ async def test_of_a_growing_log_only_the_newest_length_counts(monkeypatch: pytes
 
 async def test_the_pool_is_ready_when_every_process_is(monkeypatch: pytest.MonkeyPatch) -> None:
     async with opened(monkeypatch, 2) as stage:
-        one, other = await stage.child(), await stage.child()
+        one, alternative = await stage.child(), await stage.child()
         ready = [stage.pool.is_ready]
-        for child in (one, other):
+        for child in (one, alternative):
             child.say(EstimatorReady())
             assert await stage.reports.get() == EstimatorReady()
             ready.append(stage.pool.is_ready)
         assert ready == [False, False, True]
-        other.say(LogProcessed("a"))
+        alternative.say(LogProcessed("a"))
         assert await stage.reports.get() == LogProcessed("a")
 
 

@@ -42,7 +42,7 @@ def said(answer: IntakeAnswer) -> dict[str, Any]:
 
 
 def resealed(whole: bytes, change: Callable[[bytearray], None]) -> bytes:
-    """A frame changed with a checksum that fits again: what a wrong client sends, not a bad cable."""
+    """Modified frame with a valid checksum: a faulty client, not a transmission error."""
     body = bytearray(whole[:-4])
     change(body)
     return bytes(body) + struct.pack("<I", crc32(bytes(body)))
@@ -53,9 +53,9 @@ def test_a_first_hello_is_welcomed_with_batch_zero() -> None:
 
 
 def test_the_same_hello_with_another_token_resumes() -> None:
-    again = parse(hello_json(HELLO, "another").decode())
-    assert isinstance(again, Hello)
-    assert said(greeted(5).greet(again))["next_seq"] == 5
+    second = parse(hello_json(HELLO, "another").decode())
+    assert isinstance(second, Hello)
+    assert said(greeted(5).greet(second))["next_seq"] == 5
 
 
 def test_a_welcome_promises_only_what_is_durable() -> None:
@@ -78,9 +78,9 @@ def test_a_changed_hello_is_refused(changed: str) -> None:
             root["streams"][0]["sensors"][0]["segment"] = None
         case "sensor":
             root["streams"][1]["sensors"].append({"id": "C", "segment": None})
-    other = parse(json.dumps(root))
-    assert isinstance(other, Hello)
-    answer = greeted(2).greet(other)
+    second = parse(json.dumps(root))
+    assert isinstance(second, Hello)
+    answer = greeted(2).greet(second)
     assert (answer.close, answer.reason) == (CloseCode.MALFORMED, "hello_changed")
     assert said(answer)["code"] == "hello_changed"
 
@@ -172,10 +172,10 @@ def test_a_json_batch_is_kept_in_binary_form() -> None:
     }  # fmt: skip
     answer = greeted().offer(json.dumps(root))
     assert answer.keep is not None
-    again = decode_batch(answer.keep[1])
-    assert (again.stream, again.seq, again.sent_us) == (3, 0, 7)
-    np.testing.assert_array_equal(again.samples, batch.samples)
-    np.testing.assert_array_equal(again.offsets_us, batch.offsets_us)
+    second_batch = decode_batch(answer.keep[1])
+    assert (second_batch.stream, second_batch.seq, second_batch.sent_us) == (3, 0, 7)
+    np.testing.assert_array_equal(second_batch.samples, batch.samples)
+    np.testing.assert_array_equal(second_batch.offsets_us, batch.offsets_us)
 
 
 def test_battery_is_handed_on_and_not_kept() -> None:

@@ -1,4 +1,4 @@
-"""The first take after a start: estimators get warm with the server, and nobody has to wait for them."""
+"""Estimators warm up with the server, and the first trial does not wait for them."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ async def unready(
 
 
 async def walking(ws: ClientConnection) -> None:
-    """Send a walk as fast as it is walked, for as long as anybody looks."""
+    """Stream a walk in real time while anybody is watching."""
     for one in walk():
         await ws.send(one.frame)
         await asyncio.sleep(BATCH_S)
@@ -93,24 +93,24 @@ async def test_clock_and_sensors_are_told_before_the_estimator_is_ready(
     clinic, port, _ = unready
     async with visit(clinic, port) as v, v.feed() as page:
         hello = walk_hello(v.take)
-        worn = {s.id: s.segment for stream in hello.streams for s in stream.sensors}
+        segments = {s.id: s.segment for stream in hello.streams for s in stream.sensors}
         async with v.tablet(v.hello(hello)) as ws:
             await heard(ws, "welcome")
             feet = asyncio.create_task(walking(ws))
-            told = await heard(page, "state", state="streaming")
-            while not told["elapsed_s"] or told["elapsed_s"] < 1.0:
-                told = await heard(page, "state")
+            notices = await heard(page, "state", state="streaming")
+            while not notices["elapsed_s"] or notices["elapsed_s"] < 1.0:
+                notices = await heard(page, "state")
             marked = await v.command("mark", "stumbled")
             polled = await v.state()
             feet.cancel()
     assert not clinic.app.state.hub.pool.is_ready
-    assert told["estimate"] == polled["estimate"] == "preparing"
-    assert {row["id"]: row["segment"] for row in told["sensors"]} == worn
-    assert {row["state"] for row in told["sensors"]} == {"ok"}
-    assert {row["lost_pct"] for row in told["sensors"]} == {None}, "nobody has counted yet: not zero"
+    assert notices["estimate"] == polled["estimate"] == "preparing"
+    assert {row["id"]: row["segment"] for row in notices["sensors"]} == segments
+    assert {row["state"] for row in notices["sensors"]} == {"ok"}
+    assert {row["lost_pct"] for row in notices["sensors"]} == {None}, "nobody has counted yet: not zero"
     # a batch may arrive between counting and looking at the clock
-    assert told["elapsed_s"] == pytest.approx(told["count"] * BATCH_S, abs=2 * BATCH_S)
-    assert told["elapsed_s"] - BATCH_S <= marked["marks"][0]["t_s"] <= polled["elapsed_s"] + BATCH_S
+    assert notices["elapsed_s"] == pytest.approx(notices["count"] * BATCH_S, abs=2 * BATCH_S)
+    assert notices["elapsed_s"] - BATCH_S <= marked["marks"][0]["t_s"] <= polled["elapsed_s"] + BATCH_S
 
 
 @pytest.mark.slow
@@ -132,11 +132,15 @@ async def test_a_take_that_ended_before_the_estimator_was_ready_leaves_no_error(
         compiled.touch()
         await until(lambda: hub.pool.is_ready)
         # another take is followed: what was ordered before it is done with
-        async with visit(clinic, port) as w, w.feed() as other, w.tablet(w.hello(walk_hello(w.take))) as ws:
+        async with (
+            visit(clinic, port) as w,
+            w.feed() as other_feed,
+            w.tablet(w.hello(walk_hello(w.take))) as ws,
+        ):
             await heard(ws, "welcome")
             for one in frames:
                 await ws.send(one)
-            await heard(other, "frame")
+            await heard(other_feed, "frame")
         assert (await heard(page, "state"))["estimate"] != "failed"
     assert "Traceback" not in capfd.readouterr().err
 
@@ -152,10 +156,10 @@ def test_a_log_that_is_gone_is_told_in_a_sentence(tmp_path: Path, caplog: pytest
         LogGrown({"b" * 32: 200}, 0.0),
     ):
         web.send(encode(order))
-    said: list[EstimateFailed] = []
+    message: list[EstimateFailed] = []
     with pytest.raises((EOFError, ConnectionError)):
-        follow_until_closed(line, web, said)
-    assert [(report.take, report.code) for report in said] == [("b" * 32, "live_log_gone")]
+        follow_until_closed(line, web, message)
+    assert [(report.take, report.code) for report in message] == [("b" * 32, "live_log_gone")]
     assert not caplog.records
 
 
@@ -164,13 +168,13 @@ def vars_of(begin: FollowTake) -> tuple[Any, ...]:
     return tuple(getattr(begin, name) for name in begin.__struct_fields__[1:])
 
 
-def follow_until_closed(line: Channel, web: Channel, said: list[EstimateFailed]) -> None:
+def follow_until_closed(line: Channel, web: Channel, message: list[EstimateFailed]) -> None:
     """Follow until the first report, then close the web's side."""
 
     def read() -> None:
         report = decode_report(web.receive())
         assert isinstance(report, EstimateFailed)
-        said.append(report)
+        message.append(report)
         web.close()
 
     reader = threading.Thread(target=read)

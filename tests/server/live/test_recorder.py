@@ -54,9 +54,9 @@ def test_what_is_acknowledged_is_in_the_log_and_survives_a_new_start(tmp_path: P
             assert heard.acks == sorted(heard.acks)
             assert heard.acks[-1] == 10
             assert heard.sizes[-1] == recorder.size == path.stat().st_size
-        async with recording(path) as (again, heard):
-            assert (again.next_seq, again.durable, heard.acks) == (10, 10, [])
-            again.offer(frame(10))
+        async with recording(path) as (repeat, heard):
+            assert (repeat.next_seq, repeat.durable, heard.acks) == (10, 10, [])
+            repeat.offer(frame(10))
             await until(lambda: heard.acks == [11])
         assert stored(path) == [frame(i) for i in range(11)]
 
@@ -99,10 +99,10 @@ def test_the_finish_is_told_once_it_is_durable_and_again_when_asked_again(tmp_pa
             await until(lambda: heard.ends)
             assert recorder.end == heard.ends[0]
             assert (recorder.end.count, recorder.end.sha256) == (4, digest(frames))
-        async with recording(tmp_path / "t.log") as (again, heard):
-            assert again.greet(HELLO).close is None
-            assert again.offer(finish_text(frames)).ended == again.end != None  # noqa: E711
-            assert again.offer(frame(4)).close is CloseCode.ENDED
+        async with recording(tmp_path / "t.log") as (repeat, heard):
+            assert repeat.greet(HELLO).close is None
+            assert repeat.offer(finish_text(frames)).ended == repeat.end != None  # noqa: E711
+            assert repeat.offer(frame(4)).close is CloseCode.ENDED
             assert not heard.ends
 
     asyncio.run(run())
@@ -291,9 +291,9 @@ def test_a_take_that_cannot_be_written_at_all_leaves_the_others_alone(
     async def run() -> None:
         committer = Committer(0.02)
         committer.start()
-        one, other = Heard(), Heard()
+        one, alternative = Heard(), Heard()
         first = await open_recorder(tmp_path / "1.log", HELLO, committer, one)
-        second = await open_recorder(tmp_path / "2.log", HELLO, committer, other)
+        second = await open_recorder(tmp_path / "2.log", HELLO, committer, alternative)
 
         def out_of_memory(_: bytes) -> None:
             raise MemoryError
@@ -303,7 +303,7 @@ def test_a_take_that_cannot_be_written_at_all_leaves_the_others_alone(
         await until(lambda: one.failures)
         assert one.failures[0].code == "storage_failed"
         second.offer(frame(0))
-        await until(lambda: other.acks == [1])
+        await until(lambda: alternative.acks == [1])
         await first.close()
         await second.close()
         committer.stop()

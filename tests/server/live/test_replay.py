@@ -18,12 +18,12 @@ pytestmark = pytest.mark.anyio
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of MT Manager files with a manifest beside them."""
-    made = simulate_scenario("comfortable", 3)
+    """Folder of MT Manager files with a manifest."""
+    simulation = simulate_scenario("comfortable", 3)
     path = tmp_path_factory.mktemp("take")
-    for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+    for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
         (path / name).write_bytes(content)
-    sensors = ",".join(f'"{d}":"{s}"' for d, s in made.recording.segments.items())
+    sensors = ",".join(f'"{d}":"{s}"' for d, s in simulation.recording.segments.items())
     (path / "manifest.json").write_text(f'{{"sensors":{{{sensors}}}}}')
     return path
 
@@ -46,16 +46,16 @@ async def test_a_folder_is_replayed_through_a_bad_network(
     take, code = open_code(clinic)
     words = ("--speed", "0", "--drop", "0.03", "--jitter", "1", "--batch", "25")
     assert await run(str(folder), "--to", f"http://127.0.0.1:{port}", "--code", code.lower(), *words) == 0
-    said = capsys.readouterr().out
-    assert "Streaming 7 sensors" in said
-    assert "Finished as recording" in said
+    stdout = capsys.readouterr().out
+    assert "Streaming 7 sensors" in stdout
+    assert "Finished as recording" in stdout
     with clinic.db.read() as c:
         row = live.get(c, take)
     assert (row.state, row.source, row.problem) == ("finished", "cli", None)
     assert row.count
-    assert f"{row.count} of {row.count} batches acknowledged" in said
+    assert f"{row.count} of {row.count} batches acknowledged" in stdout
     assert row.recording_id is not None
-    assert row.recording_id in said
+    assert row.recording_id in stdout
 
 
 @pytest.mark.slow
@@ -81,8 +81,8 @@ async def test_what_cannot_be_replayed_says_why(
     words: tuple[str, ...],
     code: str,
 ) -> None:
-    given = {"--to": f"http://127.0.0.1:{port}", "--code": "ABCDEF"} | dict(
+    inputs = {"--to": f"http://127.0.0.1:{port}", "--code": "ABCDEF"} | dict(
         zip(words[::2], words[1::2], strict=True)
     )
-    assert await run(str(folder), *[x for pair in given.items() for x in pair]) == 1
+    assert await run(str(folder), *[x for pair in inputs.items() for x in pair]) == 1
     assert f"Not replayed ({code}): " in capsys.readouterr().err

@@ -49,9 +49,9 @@ class Disk(fs.System):
 
     def fsync(self, fd: int) -> None:
         self._count()  # and no real sync: nobody cuts the power of this machine
-        found = os.fstat(fd)
-        if stat.S_ISREG(found.st_mode):
-            self.sure = found.st_size
+        fstat = os.fstat(fd)
+        if stat.S_ISREG(fstat.st_mode):
+            self.sure = fstat.st_size
 
     def _count(self) -> None:
         if self.fails_in is not None:
@@ -61,7 +61,7 @@ class Disk(fs.System):
 
 
 class Tablet:
-    """The model: what a tablet knows. It keeps every batch until it is acknowledged."""
+    """Model of a tablet: it keeps every batch until it is acknowledged."""
 
     def __init__(self) -> None:
         self.at = 0  # the batch it sends next
@@ -75,9 +75,9 @@ class Tablet:
         self.at, self.online = next_seq, True
         self.acked = next_seq
 
-    def heard(self, below: int) -> None:
-        assert below <= self.reached
-        self.acked = max(self.acked, below)
+    def heard(self, limit: int) -> None:
+        assert limit <= self.reached
+        self.acked = max(self.acked, limit)
 
     def lost(self) -> None:
         self.online = False
@@ -135,9 +135,9 @@ class Stream(RuleBasedStateMachine):
     @rule(number=st.integers(1, 5))
     def send(self, number: int) -> None:
         for one in FRAMES[self.tablet.at : self.tablet.at + number]:
-            known = self.tablet.at < self.recorder_.next_seq  # sent again after a drop: a duplicate
+            reference = self.tablet.at < self.recorder_.next_seq  # sent again after a drop: a duplicate
             answer = self.offer(one)
-            assert answer.close is (CloseCode.ENDED if self.over and not known else None)
+            assert answer.close is (CloseCode.ENDED if self.over and not reference else None)
             if answer.close is None:
                 self.tablet.at += 1
                 self.tablet.reached = max(self.tablet.reached, self.tablet.at)
@@ -209,13 +209,13 @@ class Stream(RuleBasedStateMachine):
     def the_log_is_a_prefix_of_what_was_sent_and_holds_what_was_acknowledged(self) -> None:
         if not self.path.exists():
             return
-        kept = stored(self.path)
-        assert kept == FRAMES[: len(kept)]
-        assert self.tablet.acked <= len(kept) <= self.tablet.reached
+        retained = stored(self.path)
+        assert retained == FRAMES[: len(retained)]
+        assert self.tablet.acked <= len(retained) <= self.tablet.reached
         end = self.tablet.end
         if end is not None:
             assert (end.count, end.sha256, end.problem) == (LENGTH, digest(FRAMES), None)
-            assert kept == FRAMES
+            assert retained == FRAMES
 
     # in words of the rules above
 

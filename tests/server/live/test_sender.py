@@ -1,4 +1,4 @@
-"""What a sender knows of its batches, against a server that plays a part."""
+"""Sender state against a scripted server."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def welcome(next_seq: int = 0, most: int = 100) -> str:
 
 
 class Said:
-    """What the sender passed on."""
+    """Messages passed on by the sender."""
 
     def __init__(self) -> None:
         self.messages: list[Mapping[str, Any]] = []
@@ -89,10 +89,10 @@ async def test_after_a_break_it_goes_on_where_the_server_is() -> None:
     async def goes_on(ws: ServerConnection) -> None:
         await finish(ws, 3)
 
-    said = Said()
-    sender = await play(breaks, goes_on, said=said)
+    message = Said()
+    sender = await play(breaks, goes_on, said=message)
     assert (sender.report.sent, sender.report.resent, sender.report.reconnects) == (5, 2, 1)
-    assert said.messages == []
+    assert message.messages == []
 
 
 async def test_no_more_is_sent_than_the_server_takes_unacknowledged() -> None:
@@ -108,10 +108,10 @@ async def test_no_more_is_sent_than_the_server_takes_unacknowledged() -> None:
         assert got == FRAMES[:4]
         await ws.close()
 
-    said = Said()
-    sender = await play(part, said=said)
+    message = Said()
+    sender = await play(part, said=message)
     assert (sender.report.sent, sender.waiting) == (4, 3)
-    assert [m["words"] for m in said.messages] == ["hold on"]
+    assert [m["words"] for m in message.messages] == ["hold on"]
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from tests.helpers.service import new_session, served, wait_for
 
 
 def opened(client: httpx.Client, session: str) -> tuple[dict[str, Any], str]:
-    """What a tablet got for its code, and the address of its socket."""
+    """Pairing response of a tablet with its socket address."""
     code = client.post(f"/api/v1/sessions/{session}/live").raise_for_status().json()["code"]
     paired = client.post("/api/v1/live/pairings", json={"code": code}).raise_for_status().json()
     return paired, str(client.base_url).replace("http://", "ws://").rstrip("/") + paired["socket"]
@@ -47,12 +47,12 @@ def test_a_finished_take_is_analysed_like_an_upload(tmp_path: Path) -> None:
         assert {j["kind"] for j in jobs} == {"inspect", "analyse"}
         for one in jobs:
             assert wait_for(client, one["id"])["state"] == "done"
-        found = client.get(f"/api/v1/sessions/{session}/report").raise_for_status().json()
+        body = client.get(f"/api/v1/sessions/{session}/report").raise_for_status().json()
         (analysis,) = client.get(f"/api/v1/sessions/{session}/analyses").raise_for_status().json()
         content = client.get(f"/api/v1/sessions/{session}/files/{recording['files'][0]['name']}").content
     assert content.startswith(b"SAGLIVE1\n")
     assert analysis["recording_id"] == report.recording
-    strides = next(p for p in found["parameters"] if p["name"] == "stride_time_s")
+    strides = next(p for p in body["parameters"] if p["name"] == "stride_time_s")
     assert 0.9 < strides["left"]["value"] < 1.2
 
 
@@ -89,6 +89,6 @@ def test_sigterm_in_a_take_keeps_what_came_and_ends_within_ten_seconds_nothing_w
                 while True:
                     ws.recv(timeout=5)
     assert service.process.returncode == 0
-    kept = stored(tmp_path / "data" / "live" / f"{paired['take']}.log")
-    assert kept == frames[: len(kept)]
-    assert len(kept) >= acknowledged
+    retained = stored(tmp_path / "data" / "live" / f"{paired['take']}.log")
+    assert retained == frames[: len(retained)]
+    assert len(retained) >= acknowledged

@@ -74,11 +74,13 @@ async def test_an_estimator_that_sleeps_delays_no_acknowledgement(
 ) -> None:
     none: list[dict[str, Any]] = []
     late: list[dict[str, Any]] = []
-    alone = await streamed(clinic, port, none)
-    beside = await streamed(*sleepy, late)
+    single = await streamed(clinic, port, none)
+    neighbour = await streamed(*sleepy, late)
     assert not none
     assert 0 < len(late) <= SECONDS / SLEEP_S + 2  # it did sleep, 30 would come in a second
     assert any(picture["stale"] for picture in late)
-    assert len(beside.ack_s) == len(alone.ack_s) == len(some_of_the_walk())
-    assert beside.ack_quantile(0.5) < max(GROUP_S, 1.5 * alone.ack_quantile(0.5))
-    assert beside.ack_quantile(0.99) < max(2 * GROUP_S, 2.0 * alone.ack_quantile(0.99)) < SLEEP_S + GROUP_S
+    assert len(neighbour.ack_s) == len(single.ack_s) == len(some_of_the_walk())
+    assert neighbour.ack_quantile(0.5) < max(GROUP_S, 1.5 * single.ack_quantile(0.5))
+    assert (
+        neighbour.ack_quantile(0.99) < max(2 * GROUP_S, 2.0 * single.ack_quantile(0.99)) < SLEEP_S + GROUP_S
+    )

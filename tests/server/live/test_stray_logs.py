@@ -1,4 +1,4 @@
-"""Live logs that are damaged, or that the database does not know: kept, said, and given back."""
+"""Live logs that are damaged or unknown to the database: kept, reported, adopted."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def put_stray(folder: Path, content: bytes = WHOLE) -> Path:
 
 def findings(settings: Settings) -> list[str]:
     with closing(Database(settings.database_source)) as db:
-        found = checks.check(db, FolderBlobs(settings.blobs), settings)
-    return [f"{f.area}: {f.message}" for f in found]
+        result = checks.check(db, FolderBlobs(settings.blobs), settings)
+    return [f"{f.area}: {f.message}" for f in result]
 
 
-def flip(path: Path, at: int) -> bytes:
-    """Change one bit, as a disk does, and return what is there now."""
+def flip(path: Path, position: int) -> bytes:
+    """Flip one bit of a file and return its new content."""
     content = bytearray(path.read_bytes())
-    content[at] ^= 1
+    content[position] ^= 1
     path.write_bytes(content)
     return bytes(content)
 
@@ -86,9 +86,9 @@ async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         assert path.read_bytes() == WHOLE
         assert f"knows nothing of {path}" in caplog.text
-        [said] = findings(clinic.settings)
-        assert said.startswith(f"live: the database knows nothing of {path.name}")
-        assert "3 sensors, 20 batches" in said
+        [message] = findings(clinic.settings)
+        assert message.startswith(f"live: the database knows nothing of {path.name}")
+        assert "3 sensors, 20 batches" in message
 
         capsys.readouterr()
         data = ["--data", str(tmp_path)]
@@ -98,10 +98,10 @@ async def test_a_log_that_the_database_does_not_know_is_kept_listed_and_adopted(
         assert f"/sessions/{session}" in capsys.readouterr().out
         assert not path.exists()
         with clinic.db.read() as c:
-            made = recordings.require_current(c, session)
+            current = recordings.require_current(c, session)
             take = live.get(c, STRAY)
-        assert (take.state, take.recording_id, take.count) == ("closed", made.id, 20)
-        [file] = made.files
+        assert (take.state, take.recording_id, take.count) == ("closed", current.id, 20)
+        [file] = current.files
         with clinic.db.read() as c:
             patient = sessions.get(c, session).patient_id
         assert clinic.app.state.blobs.read(patient, file.sha256) == WHOLE
@@ -121,7 +121,7 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
         tell_commands(monkeypatch, clinic.settings)
         data = ["adopt", "--data", str(tmp_path)]
         empty = put_stray(tmp_path, b"no log at all")
-        for words, why in (
+        for words, reason in (
             ([*data, STRAY], "Give both"),
             ([*data, "--session", session], "Give both"),
             ([*data, "b" * 32, "--session", session], "no live log"),
@@ -129,16 +129,16 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
             ([*data, STRAY, "--session", session], "holds no sample"),
         ):
             assert main(words) != 0
-            assert why in capsys.readouterr().err
+            assert reason in capsys.readouterr().err
         assert empty.read_bytes() == b"no log at all"
         put_stray(tmp_path)
         assert main([*data, STRAY, "--session", "c" * 32]) == 1
         assert "no session" in capsys.readouterr().err
-        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
-        live_logs.adopt(*here, STRAY, session)
+        place = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        live_logs.adopt(*place, STRAY, session)
         path = put_stray(tmp_path)
         with pytest.raises(Conflict, match="belongs to a session already"):
-            live_logs.adopt(*here, STRAY, session)
+            live_logs.adopt(*place, STRAY, session)
         assert path.read_bytes() == WHOLE
 
 
@@ -153,11 +153,11 @@ async def test_an_adoption_that_dies_half_way_is_finished_by_the_next_start(
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         session = new_session(clinic)
         path = put_stray(tmp_path)
-        here = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
+        place = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
         with monkeypatch.context() as patch:
             patch.setattr(f"sagittal.server.live_takes.live_recordings._{broken}", dies)
             with pytest.raises(RuntimeError):
-                live_logs.adopt(*here, STRAY, session)
+                live_logs.adopt(*place, STRAY, session)
         assert path.read_bytes() == WHOLE
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         assert not path.exists()
@@ -172,9 +172,9 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
     clinic, session, take = await interrupted(tmp_path)
     path = live_recordings.log_path(clinic.settings.live, take)
     hurt = flip(path, path.stat().st_size // 2)
-    [said] = findings(clinic.settings)
-    assert said.startswith(f"live: {take}.log: ")
-    assert "bytes of the live recording were damaged" in said
+    [message] = findings(clinic.settings)
+    assert message.startswith(f"live: {take}.log: ")
+    assert "bytes of the live recording were damaged" in message
     users = clinic.users
     async with open_clinic(tmp_path, live_workers=0) as clinic:
         clinic.users = users
@@ -189,12 +189,12 @@ async def test_a_damaged_log_keeps_its_original_and_the_session_says_so(
                 ):
                     await asyncio.sleep(0.05)
         assert "damaged on the server&#39;s disk" in page
-        [said] = findings(clinic.settings)
-        assert original.name in said
+        [message] = findings(clinic.settings)
+        assert original.name in message
         hub: Hub = clinic.app.state.hub
         row = hub.rows.take(take)
-        again = ActiveTake(hub, row, Room(), *hub.rows.prepare(row))
-        assert again._seen["notice"] == 0  # or the estimator's first notice would be taken for told
+        second = ActiveTake(hub, row, Room(), *hub.rows.prepare(row))
+        assert second._seen["notice"] == 0  # or the estimator's first notice would be taken for told
         async with clinic.client("clinician") as http:
             assert (await http.delete(f"/api/v1/sessions/{session}")).status_code == 204
         assert not original.exists()
@@ -213,4 +213,4 @@ async def test_a_log_without_a_readable_sample_is_not_thrown_away(tmp_path: Path
         with clinic.db.read() as c:
             [text] = live_events.list_damages(c, session)
         assert "damaged on the server's disk" in text
-        assert any(".1.damaged" in said for said in findings(clinic.settings))
+        assert any(".1.damaged" in finding for finding in findings(clinic.settings))

@@ -36,8 +36,8 @@ async def gone(log: Path) -> None:
             await asyncio.sleep(0.01)
 
 
-async def acknowledged(ws: ClientConnection, below: int) -> None:
-    while (await heard(ws, "ack"))["ack"] < below:
+async def acknowledged(ws: ClientConnection, limit: int) -> None:
+    while (await heard(ws, "ack"))["ack"] < limit:
         pass
 
 
@@ -57,7 +57,7 @@ async def test_a_take_from_hello_to_a_recording_of_the_same_bytes(clinic: Clinic
             await ws.send(one)
         await acknowledged(ws, 20)
         log = log_path(clinic.settings.live, v.take)
-        before = log.read_bytes()
+        initial_content = log.read_bytes()
         assert (await v.state())["state"] == "streaming"
         assert not (await v.state())["stopping"]
         (await v.http.post(f"{v.api}/commands", json={"command": "stop"})).raise_for_status()
@@ -68,19 +68,19 @@ async def test_a_take_from_hello_to_a_recording_of_the_same_bytes(clinic: Clinic
     assert (row.state, row.count, row.sha256, row.problem) == ("finished", 20, digest(frames), None)
     assert row.recording_id == recording_id
     with clinic.db.read() as c:
-        made = recordings.current(c, v.session)
+        current = recordings.current(c, v.session)
         kinds = c.execute(select(job.c.kind).where(job.c.recording_id == recording_id).order_by(job.c.seq))
         assert list(kinds.scalars()) == ["inspect", "analyse"]
         trail = set(c.execute(select(audit.c.action).where(audit.c.resource_id == v.session)).scalars())
     assert {"live.opened", "live.paired", "live.finished", "analysis.requested"} <= trail
-    assert made is not None
-    assert made.id == recording_id
-    (file,) = made.files
+    assert current is not None
+    assert current.id == recording_id
+    (file,) = current.files
     assert file.name.startswith("live-")
     assert file.name.endswith(".sagittal-live")
-    content = clinic.app.state.blobs.read(made.patient_id, file.sha256)
-    assert content.startswith(before)
-    assert made.manifest == {
+    content = clinic.app.state.blobs.read(current.patient_id, file.sha256)
+    assert content.startswith(initial_content)
+    assert current.manifest == {
         "sensors": {"A1": "pelvis", "A2": "foot_l", "B1": "foot_r"},
         "subject": {"height_m": 1.75},
         "protocol": "walk",
@@ -110,8 +110,8 @@ async def test_a_tablet_that_comes_back_goes_on_where_the_disk_is(clinic: Clinic
 
 
 async def test_wrong_expired_and_foreign_tokens_are_refused(clinic: Clinic, port: int) -> None:
-    async with visit(clinic, port) as one, visit(clinic, port) as other:
-        for token in ("wrong", other.token):
+    async with visit(clinic, port) as one, visit(clinic, port) as alternative:
+        for token in ("wrong", alternative.token):
             async with one.tablet(one.hello(token=token)) as ws:
                 assert (await heard(ws, "error"))["code"] == "token_not_valid"
                 assert await closed(ws) == (CloseCode.UNAUTHORISED, "token_not_valid")
@@ -205,20 +205,20 @@ async def test_a_take_closed_here_tells_the_tablet_and_keeps_what_came(clinic: C
         await heard(ws, "welcome")
         await ws.send(frame(0))
         await acknowledged(ws, 1)
-        made = (await v.http.post(f"{v.api}/close")).raise_for_status().json()
-        assert (made["state"], made["count"]) == ("closed", 1)
+        body = (await v.http.post(f"{v.api}/close")).raise_for_status().json()
+        assert (body["state"], body["count"]) == ("closed", 1)
         assert await closed(ws) == (CloseCode.ENDED, "take_ended")
-        assert (await v.state())["recording"] == made["recording_id"] is not None
-        async with v.tablet() as again:
-            assert (await closed(again))[0] == CloseCode.ENDED
+        assert (await v.state())["recording"] == body["recording_id"] is not None
+        async with v.tablet() as repeat:
+            assert (await closed(repeat))[0] == CloseCode.ENDED
         assert (await v.http.post(f"{v.api}/close")).status_code == 409
 
 
 async def test_a_take_without_a_sample_ends_without_a_recording(clinic: Clinic, port: int) -> None:
     async with visit(clinic, port) as v, v.tablet() as ws:
         await heard(ws, "welcome")
-        made = (await v.http.post(f"{v.api}/close")).raise_for_status().json()
-        assert (made["state"], made["recording_id"]) == ("closed", None)
+        body = (await v.http.post(f"{v.api}/close")).raise_for_status().json()
+        assert (body["state"], body["recording_id"]) == ("closed", None)
     with clinic.db.read() as c:
         assert recordings.current(c, v.session) is None
     await gone(log_path(clinic.settings.live, v.take))
@@ -246,8 +246,8 @@ async def test_erasing_the_session_ends_its_take(clinic: Clinic, port: int) -> N
         await acknowledged(ws, 1)
         (await v.http.delete(f"/api/v1/sessions/{v.session}")).raise_for_status()
         assert await closed(ws) == (CloseCode.ENDED, "take_ended")
-        async with v.tablet() as again:
-            assert (await closed(again))[0] == CloseCode.UNAUTHORISED
+        async with v.tablet() as repeat:
+            assert (await closed(repeat))[0] == CloseCode.UNAUTHORISED
     assert not log_path(clinic.settings.live, v.take).exists()
 
 

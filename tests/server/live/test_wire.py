@@ -1,4 +1,4 @@
-"""What browsers get of a frame: degrees, null for what is not known, words for sensors; who watches how."""
+"""Frame messages for browsers: degrees, null for unknown values, texts for sensors; permissions."""
 
 from __future__ import annotations
 
@@ -42,12 +42,17 @@ def test_angles_are_degrees_and_what_is_lost_is_null() -> None:
         contact={"left": True, "right": False},
     )
     trail = AngleTrail(np.array([1.49, 1.5]), ("knee", "hip"), np.array([[0.0, np.nan], [np.pi / 6, 0.1]]))
-    said = told(frame, (trail,))
-    assert said["angles_deg"] == {"knee": 30.0, "hip": None}
-    assert said["trace"] == {"t": [1.49, 1.5], "knee": [0.0, 30.0], "hip": [None, 5.73]}
-    assert said["contact"] == {"l": True, "r": False}
-    assert said["phase"] == {"l": 40.0, "r": None}
-    assert (said["t"], said["stage"], said["calibration"], said["health"]) == (1.5, "running", None, [])
+    message = told(frame, (trail,))
+    assert message["angles_deg"] == {"knee": 30.0, "hip": None}
+    assert message["trace"] == {"t": [1.49, 1.5], "knee": [0.0, 30.0], "hip": [None, 5.73]}
+    assert message["contact"] == {"l": True, "r": False}
+    assert message["phase"] == {"l": 40.0, "r": None}
+    assert (message["t"], message["stage"], message["calibration"], message["health"]) == (
+        1.5,
+        "running",
+        None,
+        [],
+    )
 
 
 def test_trails_that_were_not_sent_are_joined_and_other_names_are_another_curve() -> None:
@@ -88,20 +93,20 @@ def test_a_failed_calibration_says_why() -> None:
     notice = Notice("not_still", "The left foot moved.", "foot_l", 2.0)
     check = SegmentCheck("foot_l", False, None, None, (notice,))
     view = CalibrationView(3.0, 0.0, 0, (check,), False, notice)
-    said = told(LiveFrame(2.0, 1, "stand", calibration=view))["calibration"]
-    assert said["problem"]["message"] == "The left foot moved."
-    assert said["checks"][0]["notices"][0]["severity"] == "warn"
-    assert (said["ok"], said["checks"][0]["score"]) == (False, None)
+    message = told(LiveFrame(2.0, 1, "stand", calibration=view))["calibration"]
+    assert message["problem"]["message"] == "The left foot moved."
+    assert message["checks"][0]["notices"][0]["severity"] == "warn"
+    assert (message["ok"], message["checks"][0]["score"]) == (False, None)
 
 
 def test_a_calibration_that_does_not_pass_says_where_why_and_what_to_do() -> None:
     good = CalibrationCheck("stillness", "foot_l", 1.0, 4.0, "pass")
     bad = replace(good, segment="shank_r", value=6.0, verdict="redo", why="shank_r tilted.")
     view = CalibrationView(3.0, 9.0, 8, (), True, score=CalibrationScore((good, bad)))
-    said = told(LiveFrame(2.0, 1, "running", calibration=view))["calibration"]["verdict"]
-    assert said["verdict"] == "redo"
-    assert said["headline"] == "Calibrate again: 1 of 2 checks fails, at the right shank."
-    assert said["redo"] == [
+    message = told(LiveFrame(2.0, 1, "running", calibration=view))["calibration"]["verdict"]
+    assert message["verdict"] == "redo"
+    assert message["headline"] == "Calibrate again: 1 of 2 checks fails, at the right shank."
+    assert message["redo"] == [
         {
             "place": "right shank",
             "title": "Standing still",
@@ -116,11 +121,11 @@ def test_a_calibration_that_does_not_pass_says_where_why_and_what_to_do() -> Non
 
 
 def test_a_stride_has_51_points_and_the_reason_of_every_null() -> None:
-    said = wire.stride(STRIDE)
-    assert said["foot_off_pct"] == 60.0
-    assert said["values"] == {"stance_pct": 60.0, "step_length_m": None}
-    assert said["reasons"] == {"step_length_m": "not_yet"}
-    assert said["curves_deg"]["knee_flexion"][::25] == [0.0, 45.0, 90.0]
+    stride = wire.stride(STRIDE)
+    assert stride["foot_off_pct"] == 60.0
+    assert stride["values"] == {"stance_pct": 60.0, "step_length_m": None}
+    assert stride["reasons"] == {"step_length_m": "not_yet"}
+    assert stride["curves_deg"]["knee_flexion"][::25] == [0.0, 45.0, 90.0]
     assert wire.stride(replace(STRIDE, foot_off_s=None))["foot_off_pct"] is None
 
 
@@ -155,8 +160,8 @@ def test_who_comes_later_gets_the_last_strides_and_cues_and_nothing_of_another_t
     room.say("feedback", b"feedback")
     got = asyncio.run(first())
     assert [m for m in got if m.startswith(b"cue")] == [b"cue %d" % k for k in range(100 - KEPT, 100)]
-    told = [msgspec.json.decode(m) for m in got if m.startswith(b"{")]
-    assert told == [{"n": n, "telling": 2} for n in range(100 - KEPT, 100)], "each as it was told last"
+    texts = [msgspec.json.decode(m) for m in got if m.startswith(b"{")]
+    assert texts == [{"n": n, "telling": 2} for n in range(100 - KEPT, 100)], "each as it was told last"
     assert got[-1] == b"feedback"
     room.forget_strides()
     room.keep_stride(b'{"n":0}')

@@ -24,7 +24,7 @@ PASSWORD = "a few unrelated words"
 
 @dataclass
 class RunningNode:
-    """A web server's process. said : what it printed when it answered."""
+    """Web server process. said : its output when it became ready."""
 
     settings: Settings
     process: subprocess.Popen[str]
@@ -54,11 +54,11 @@ class RunningNode:
 
 
 def find_ports(n: int) -> list[int]:
-    with contextlib.ExitStack() as taken:
-        found = [taken.enter_context(socket.socket()) for _ in range(n)]
-        for one in found:
+    with contextlib.ExitStack() as exit_stack:
+        enter_contexts = [exit_stack.enter_context(socket.socket()) for _ in range(n)]
+        for one in enter_contexts:
             one.bind(("127.0.0.1", 0))
-        return [int(one.getsockname()[1]) for one in found]
+        return [int(one.getsockname()[1]) for one in enter_contexts]
 
 
 def describe(folder: Path, url: str, name: str, port: int) -> Settings:

@@ -1,4 +1,4 @@
-"""A request is passed on as it came to the server to which it belongs, and its answer comes back."""
+"""Requests forwarded unchanged to the responsible server, with its response."""
 
 from __future__ import annotations
 
@@ -51,20 +51,20 @@ async def here(scope: Scope, receive: Receive, send: Send) -> None:
 
 @asynccontextmanager
 async def other(answer: bytes) -> AsyncIterator[tuple[int, list[bytes]]]:
-    """Another server: its port, and what it was asked."""
-    asked: list[bytes] = []
+    """Second server: its port and received requests."""
+    requested_chunks: list[bytes] = []
 
     async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         head = await reader.readuntil(b"\r\n\r\n")
         length = next(int(x[15:]) for x in head.lower().split(b"\r\n") if x.startswith(b"content-length:"))
-        asked.append(head + await reader.readexactly(length))
+        requested_chunks.append(head + await reader.readexactly(length))
         writer.write(answer)
         await writer.drain()
         writer.close()
 
     server = await asyncio.start_server(serve, "127.0.0.1", 0)
     async with server:
-        yield server.sockets[0].getsockname()[1], asked
+        yield server.sockets[0].getsockname()[1], requested_chunks
 
 
 def unused_port() -> int:
@@ -102,7 +102,7 @@ async def test_what_is_passed_on_is_what_came_with_the_line_and_without_what_is_
     answer = (
         b"HTTP/1.1 418 x\r\nConnection: close\r\nX-Own: 1\r\nSet-Cookie: a=b\r\nContent-Length: 2\r\n\r\nno"
     )
-    async with other(answer) as (port, asked):
+    async with other(answer) as (port, requests):
         owners.append(Owner("b", node_at(port), must=True))
         sent = {
             "cookie": "sid=1",
@@ -111,7 +111,7 @@ async def test_what_is_passed_on_is_what_came_with_the_line_and_without_what_is_
             "accept-encoding": "gzip",
         }
         got = await ask(Nodes(), f"{PINNED}?a=%20b", content=b"body", headers=sent)
-    head, _, body = asked[0].partition(b"\r\n\r\n")
+    head, _, body = requests[0].partition(b"\r\n\r\n")
     first, *lines = head.split(b"\r\n")
     headers = {name.lower(): value for name, value in (line.split(b": ", 1) for line in lines)}
     assert first == f"POST {PINNED}?a=%20b HTTP/1.1".encode()
@@ -146,21 +146,21 @@ async def test_what_is_ours_or_of_one_that_is_away_is_answered_here(owners: list
 async def test_a_server_that_is_not_reached_is_suspected_and_the_question_asked_anew(
     owners: list[Owner | None],
 ) -> None:
-    nodes, away = Nodes(), node_at(unused_port())
-    async with other(b"HTTP/1.1 200 x\r\nContent-Length: 5\r\n\r\nthere") as (port, asked):
-        owners += [Owner("b", away, must=False), Owner("c", node_at(port, "c"), must=False)]
+    nodes, offset = Nodes(), node_at(unused_port())
+    async with other(b"HTTP/1.1 200 x\r\nContent-Length: 5\r\n\r\nthere") as (port, requests):
+        owners += [Owner("b", offset, must=False), Owner("c", node_at(port, "c"), must=False)]
         got = await ask(nodes, content=b"kept")
-    assert (got.text, nodes.suspected) == ("there", [away])
-    assert asked[0].endswith(b"\r\n\r\nkept")
+    assert (got.text, nodes.suspected) == ("there", [offset])
+    assert requests[0].endswith(b"\r\n\r\nkept")
 
 
 async def test_an_answer_that_never_came_is_not_asked_for_twice(owners: list[Owner | None]) -> None:
     nodes = Nodes()
-    async with other(b"") as (port, asked):
+    async with other(b"") as (port, requests):
         owners.append(Owner("b", node_at(port), must=True))
         got = await ask(nodes, content=b"once")
     assert (got.status_code, got.json()["code"], got.headers["retry-after"]) == (503, "node_lost", "5")
-    assert (len(asked), nodes.suspected) == (1, [])
+    assert (len(requests), nodes.suspected) == (1, [])
 
 
 async def test_a_line_to_nobody_is_unreachable() -> None:

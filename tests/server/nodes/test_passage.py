@@ -1,4 +1,4 @@
-"""A line by which one web server tells another for whom it asks holds for that one request alone."""
+"""Forwarding header between web servers is valid for a single request."""
 
 from __future__ import annotations
 
@@ -35,42 +35,46 @@ def ask(client: str = "192.0.2.7") -> Scope:
     }
 
 
-def pass_on(asked: Scope, line: bytes) -> Scope:
+def pass_on(requests: Scope, line: bytes) -> Scope:
     """What arrives: from the address of the other server, by plain HTTP."""
-    headers = [*asked["headers"], (HEADER, line)]
-    return {**asked, "client": ("10.0.0.2", 50000), "scheme": "http", "headers": headers}
+    headers = [*requests["headers"], (HEADER, line)]
+    return {**requests, "client": ("10.0.0.2", 50000), "scheme": "http", "headers": headers}
 
 
 async def see(scope: Scope) -> Scope | int:
-    """What the application sees, or the status of the refusal."""
-    seen: list[Scope | int] = []
+    """Request as seen by the application, or the status of the refusal."""
+    observations: list[Scope | int] = []
 
     async def app(scope: Any, receive: Any, send: Any) -> None:
-        seen.append(scope)
+        observations.append(scope)
 
     async def send(message: Any) -> None:
         with contextlib.suppress(KeyError):
-            seen.append(message["status"])
+            observations.append(message["status"])
 
     async def receive() -> Any:
         return {"type": "http.request", "body": b"", "more_body": False}
 
     await KnownNodes(app)(scope, receive, send)
-    return seen[0]
+    return observations[0]
 
 
 async def test_what_another_server_passes_on_is_its_clients() -> None:
-    seen = await see(pass_on(ask(), write_line(KEY, "b", "a", ask())))
-    assert isinstance(seen, dict)
-    assert (seen["client"][0], seen["scheme"], seen[ASKED_BY]) == ("192.0.2.7", "https", "b")
-    assert HEADER not in dict(seen["headers"])
+    observations = await see(pass_on(ask(), write_line(KEY, "b", "a", ask())))
+    assert isinstance(observations, dict)
+    assert (observations["client"][0], observations["scheme"], observations[ASKED_BY]) == (
+        "192.0.2.7",
+        "https",
+        "b",
+    )
+    assert HEADER not in dict(observations["headers"])
 
 
 async def test_without_a_line_nothing_is_believed() -> None:
-    seen = await see(ask("10.0.0.2"))
-    assert isinstance(seen, dict)
-    assert ASKED_BY not in seen
-    assert seen["client"][0] == "10.0.0.2"
+    observations = await see(ask("10.0.0.2"))
+    assert isinstance(observations, dict)
+    assert ASKED_BY not in observations
+    assert observations["client"][0] == "10.0.0.2"
 
 
 CHANGES: dict[str, Callable[[Scope], Any]] = {

@@ -32,7 +32,7 @@ URL = "postgresql://sagittal@127.0.0.1/sagittal"
 
 @pytest.fixture
 def db(source: Path | str) -> Iterator[Database]:
-    """On both engines: what a node writes is plain SQL."""
+    """Database on both engines."""
     with closing(Database(source)) as db:
         yield db
 
@@ -99,14 +99,14 @@ def test_all_agree_where_something_lives_and_it_moves_when_one_is_away(tmp_path:
         b._look()
         words = [new_id() for _ in range(40)]
         at_a, at_b = [[nodes.find_home(word) for word in words] for nodes in (a, b)]
-        assert [here is None for here in at_a] == [there is not None for there in at_b]
-        assert {here is None for here in at_a} == {True, False}
-        away = next(home for home in at_a if home is not None)
-        a.suspect(away)
+        assert [place is None for place in at_a] == [target is not None for target in at_b]
+        assert {place is None for place in at_a} == {True, False}
+        offset = next(home for home in at_a if home is not None)
+        a.suspect(offset)
         assert all(a.find_home(word) is None for word in words)
         b._write_beat(now())
         a._look()
-        assert a.find_home(words[at_a.index(away)]) is not None
+        assert a.find_home(words[at_a.index(offset)]) is not None
 
 
 def test_an_open_take_is_its_nodes_alone_and_one_that_is_over_anybodys_while_that_is_away(
@@ -116,9 +116,9 @@ def test_an_open_take_is_its_nodes_alone_and_one_that_is_over_anybodys_while_tha
         take = make_take(db, a)
         pin = Pin("session", take.session_id)
         assert find_owner(db, a, pin) is None
-        found = find_owner(db, b, pin)
-        assert found is not None
-        assert (found.name, found.must, found.node is not None) == ("a", True, True)
+        owner = find_owner(db, b, pin)
+        assert owner is not None
+        assert (owner.name, owner.must, owner.node is not None) == ("a", True, True)
         with db.write() as c:
             c.execute(update(web_node).where(web_node.c.name == "a").values(beat_at=None))
         b._look()
@@ -155,9 +155,9 @@ def test_who_was_silent_for_a_month_is_forgotten_and_its_starts_still_count_on(
         assert [node.name for node in b.list_all()] == ["a", "b"]
         with db.write() as c:
             c.execute(update(web_node).where(web_node.c.name == "a").values(beat_at=now() - 2 * FORGOTTEN))
-    with running(db, describe(tmp_path, "b")) as b, running(db, describe(tmp_path, "a")) as again:
+    with running(db, describe(tmp_path, "b")) as b, running(db, describe(tmp_path, "a")) as repeat:
         assert [node.name for node in b.list_all()] == ["a", "b"]
-        assert (again.run, b.run) == (2, 2)
+        assert (repeat.run, b.run) == (2, 2)
 
 
 def test_a_node_on_another_folder_is_refused(tmp_path: Path, db: Database) -> None:
@@ -168,28 +168,28 @@ def test_a_node_on_another_folder_is_refused(tmp_path: Path, db: Database) -> No
 
 
 def test_logs_of_who_cannot_run_beside_it_are_taken_in(tmp_path: Path, db: Database) -> None:
-    alone = Settings(data_dir=tmp_path)
+    single = Settings(data_dir=tmp_path)
     a, b = describe(tmp_path, "a"), describe(tmp_path, "b")
-    for settings, name in ((alone, "1"), (b, "2")):
+    for settings, name in ((single, "1"), (b, "2")):
         settings.live.mkdir(parents=True)
         (settings.live / f"{name * 32}.log").write_bytes(b"")
-    (alone.live / f"{'1' * 32}.film").write_bytes(b"")
+    (single.live / f"{'1' * 32}.film").write_bytes(b"")
     a.live.mkdir(parents=True)
     live_recordings._take_in(db, a)
     assert sorted(path.name[0] for path in a.live.iterdir()) == ["1", "1"]
     assert [path.name[0] for path in b.live.iterdir()] == ["2"]
-    live_recordings._take_in(db, alone)
-    assert sorted(path.name[0] for path in alone.live.iterdir()) == ["1", "1", "2"]
+    live_recordings._take_in(db, single)
+    assert sorted(path.name[0] for path in single.live.iterdir()) == ["1", "1", "2"]
 
 
 def test_a_film_that_waits_is_found_where_it_was_taken_in(tmp_path: Path, db: Database) -> None:
-    alone = Settings(data_dir=tmp_path)
-    alone.live.mkdir(parents=True)
+    single = Settings(data_dir=tmp_path)
+    single.live.mkdir(parents=True)
     with db.write() as c:
         session = sessions.create(c, None, patients.create(c, None, code="P-1").id, title="Walk")
         take = live.open_take(c, None, session.id, live.ALONE)[0]
         live.end(c, None, take.id, "closed", count=0)
-    (alone.live / f"{take.id}.film").write_bytes(b"")
+    (single.live / f"{take.id}.film").write_bytes(b"")
     pin = Pin("take", take.id)
     with running(db, describe(tmp_path, "a")) as a, running(db, describe(tmp_path, "b")) as b:
         for settings in (describe(tmp_path, "a"), describe(tmp_path, "b")):  # the second finds nothing
@@ -197,15 +197,15 @@ def test_a_film_that_waits_is_found_where_it_was_taken_in(tmp_path: Path, db: Da
             live_recordings._take_in(db, settings)
         a._look()
         assert find_owner(db, a, pin) is None
-        found = find_owner(db, b, pin)
-        assert found is not None
-        assert (found.name, found.must) == ("a", True)
+        owner = find_owner(db, b, pin)
+        assert owner is not None
+        assert (owner.name, owner.must) == ("a", True)
         # killed between the move and the note of it
         with db.write() as c:
             c.execute(update(live_take).values(node=None))
         live_recordings._take_in(db, describe(tmp_path, "a"))
-        assert find_owner(db, b, pin) == found
-    live_recordings._take_in(db, alone)
+        assert find_owner(db, b, pin) == owner
+    live_recordings._take_in(db, single)
     with db.read() as c:
         assert live.get(c, take.id).node is None
 

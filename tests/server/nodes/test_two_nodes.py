@@ -1,4 +1,4 @@
-"""What a clinic's people see of two web servers: one clinic."""
+"""Two web servers appear to users as one clinic."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def open_take(pair: NodePair, code: str) -> TakeThere:
     session = new_session(pair.a.client, code)
     opened = pair.b.client.post(f"/api/v1/sessions/{session}/live").raise_for_status().json()
     paired = pair_tablet(pair.a.address, opened["code"])
-    owner, other = pair.both if row_of(pair, paired.take).node == "a" else reversed(pair.both)
-    return TakeThere(session, paired.token, replace(HELLO, take=paired.take), owner, other)
+    owner, alternative = pair.both if row_of(pair, paired.take).node == "a" else reversed(pair.both)
+    return TakeThere(session, paired.token, replace(HELLO, take=paired.take), owner, alternative)
 
 
 def open_take_at(pair: NodePair, node: RunningNode, code: str) -> TakeThere:
@@ -86,11 +86,11 @@ def open_take_at(pair: NodePair, node: RunningNode, code: str) -> TakeThere:
     return next(take for number in range(50) if (take := open_take(pair, f"{code}-{number}")).owner is node)
 
 
-async def heard(ws: ClientConnection, wanted: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+async def heard(ws: ClientConnection, expected: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
     async with asyncio.timeout(PATIENCE_S):
         async for text in ws:
             message: dict[str, Any] = json.loads(text)
-            if wanted(message):
+            if expected(message):
                 return message
     pytest.fail(f"the line ended with {ws.close_code}")
 
@@ -119,8 +119,10 @@ async def test_a_take_of_one_is_seen_steered_and_closed_through_the_other(pair: 
     # the tablet, too, speaks to the one that does not have the take
     async with take.tablet(take.other) as tablet, feed(pair, take.other, take.session) as screen:
         await acknowledge(tablet, range(12))
-        seen = await heard(screen, lambda said: said.get("state") == "streaming" and said.get("count") == 12)
-        assert seen["tablet"] == "connected"
+        observations = await heard(
+            screen, lambda said: said.get("state") == "streaming" and said.get("count") == 12
+        )
+        assert observations["tablet"] == "connected"
         ask = take.other.client
         marked = await asyncio.to_thread(
             ask.post, f"{take.api}/commands", json={"command": "mark", "value": "turn"}
@@ -138,15 +140,15 @@ async def test_when_the_one_with_a_take_is_killed_the_other_goes_on_and_nothing_
     pair: NodePair,
 ) -> None:
     take = await asyncio.to_thread(open_take, pair, "K-1")
-    owner, other = take.owner, take.other
+    owner, alternative = take.owner, take.other
     given_up = await asyncio.to_thread(open_take_at, pair, owner, "E")
-    async with take.tablet(other) as tablet, given_up.tablet(owner) as second:
+    async with take.tablet(alternative) as tablet, given_up.tablet(owner) as second:
         await acknowledge(tablet, range(20))
         await acknowledge(second, range(8))
         await asyncio.to_thread(owner.kill)
         with contextlib.suppress(websockets.ConnectionClosed):
             await drain(tablet)
-    ask = other.client
+    ask = alternative.client
     # at once: patients, another session's take, its views
     assert (await asyncio.to_thread(ask.get, "/api/v1/patients")).status_code == 200
     state = (await asyncio.to_thread(ask.get, take.api)).raise_for_status().json()
@@ -155,7 +157,7 @@ async def test_when_the_one_with_a_take_is_killed_the_other_goes_on_and_nothing_
         ask.post, f"{take.api}/commands", json={"command": "mark", "value": None}
     )
     assert (refused.status_code, refused.json()["code"]) == (503, "node_away")
-    async with take.tablet(other) as tablet:
+    async with take.tablet(alternative) as tablet:
         with pytest.raises(websockets.ConnectionClosed, match="node_away"):
             await drain(tablet)
     session = await asyncio.to_thread(new_session, ask, "K-2")
@@ -166,7 +168,7 @@ async def test_when_the_one_with_a_take_is_killed_the_other_goes_on_and_nothing_
     assert (ended["state"], ended["problem"], ended["recording_id"]) == ("closed", "node_away", None)
 
     # a page that looks on meanwhile is told to come back, and is led there then
-    async with feed(pair, other, take.session) as screen:
+    async with feed(pair, alternative, take.session) as screen:
         await heard(screen, lambda said: said.get("problem") == "node_away")
         await asyncio.to_thread(owner.start_again)
         with pytest.raises(websockets.ConnectionClosed, match="moved"):
@@ -174,7 +176,7 @@ async def test_when_the_one_with_a_take_is_killed_the_other_goes_on_and_nothing_
     assert row_of(pair, given_up.hello.take).recording_id is not None
     # a tablet comes again and again; as soon as the other has heard of it, the line leads there
     await until(lambda: ask.get(take.api).json()["problem"] is None)
-    async with take.tablet(other) as tablet:
+    async with take.tablet(alternative) as tablet:
         welcome = await heard(tablet, lambda said: said.get("type") == "welcome")
         assert welcome["next_seq"] == 20
         await acknowledge(tablet, range(20, 24))
@@ -205,13 +207,15 @@ async def test_an_upload_that_began_at_one_goes_on_at_the_other(pair: NodePair) 
     begun = (
         pair.a.client.post(path, json={"name": "walk.csv", "size": len(content)}).raise_for_status().json()
     )
-    at, turn = 0, 0
-    while at < len(content):
+    body, turn = 0, 0
+    while body < len(content):
         node, turn = pair.both[turn % 2], turn + 1
         answer = node.client.patch(
-            f"{path}/{begun['id']}", content=content[at : at + 1_000_000], headers={"Upload-Offset": str(at)}
+            f"{path}/{begun['id']}",
+            content=content[body : body + 1_000_000],
+            headers={"Upload-Offset": str(body)},
         )
-        at = answer.raise_for_status().json()["offset"]
+        body = answer.raise_for_status().json()["offset"]
     done = pair.b.client.post(
         f"{path}/{begun['id']}/finish", json={"sha256": hashlib.sha256(content).hexdigest()}
     )
@@ -246,11 +250,11 @@ async def test_an_erased_session_ends_its_take_wherever_that_is(pair: NodePair) 
 async def test_a_3d_view_is_found_from_both(pair: NodePair) -> None:
     session = await asyncio.to_thread(new_session, pair.a.client, "V-1")
     for node in pair.both:
-        made = node.client.get(f"/sessions/{session}/live/figure").raise_for_status().json()["src"]
+        body = node.client.get(f"/sessions/{session}/live/figure").raise_for_status().json()["src"]
         for door in pair.both:
-            assert door.client.get(made, follow_redirects=False).status_code == 307
+            assert door.client.get(body, follow_redirects=False).status_code == 307
             async with websockets.connect(
-                f"{door.socket}{made.rstrip('/')}",
+                f"{door.socket}{body.rstrip('/')}",
                 additional_headers={"Cookie": f"sid={pair.cookie}"},
                 subprotocols=[f"viser-v{viser.__version__}"],  # type: ignore[list-item]
                 max_size=None,
@@ -273,13 +277,13 @@ async def test_each_is_listed_and_none_of_the_same_name_or_of_no_name_starts(
     assert pair.b.address in page
     url, ports = pair.a.settings.database_url, find_ports(2)
     same = start_process(describe(pair.a.settings.data_dir, url, "a", ports[0]))
-    alone = start_process(
+    single_process = start_process(
         Settings(data_dir=tmp_path, database_url=url, port=ports[1], workers=0, live_workers=0)
     )
-    for process, why in ((same, "is running on"), (alone, "give every server a SAGITTAL_NODE")):
-        said = (await asyncio.to_thread(process.communicate))[1]
+    for process, reason in ((same, "is running on"), (single_process, "give every server a SAGITTAL_NODE")):
+        text = (await asyncio.to_thread(process.communicate))[1]
         assert process.returncode == 1
-        assert why in said
+        assert reason in text
 
 
 async def test_a_backup_that_is_due_is_made_by_one(pair: NodePair, tmp_path: Path) -> None:
@@ -302,8 +306,8 @@ async def test_a_backup_that_is_due_is_made_by_one(pair: NodePair, tmp_path: Pat
 
 async def test_the_mark_follows_what_is_written_at_either(pair: NodePair) -> None:
     for number, node in enumerate(pair.both):
-        made = node.client.post("/api/v1/patients", json={"code": f"M-{number}"})
-        assert made.status_code == 201
+        response = node.client.post("/api/v1/patients", json={"code": f"M-{number}"})
+        assert response.status_code == 201
     head = pair.a.client.get("/api/v1/audit/head").raise_for_status().json()["seq"]
 
     def has_followed() -> bool:

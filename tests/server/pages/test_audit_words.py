@@ -1,4 +1,4 @@
-"""The audit page says in words what the server writes down."""
+"""Texts of the audit page for all audit entries."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ def test_what_has_no_words_shows_its_own_name() -> None:
 async def test_rows_name_the_patient_and_the_visit_while_they_exist(clinic: Clinic) -> None:
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "AU-1"})).json()["id"]
-        made = await client.post(
+        response = await client.post(
             f"/api/v1/patients/{patient}/sessions", json={"title": "Walk", "performed_on": "2026-03-02"}
         )
         html = (await client.get("/audit")).text
-        said = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", html))
-        assert "admin added the visit: AU-1, 2 Mar 2026" in said
-        assert "admin added the patient: AU-1" in said
-        assert f'href="/sessions/{made.json()["id"]}"' in html
+        message = re.sub(r"\s+", " ", re.sub(r"<[^>]+>", "", html))
+        assert "admin added the visit: AU-1, 2 Mar 2026" in message
+        assert "admin added the patient: AU-1" in message
+        assert f'href="/sessions/{response.json()["id"]}"' in html
         (await client.delete(f"/api/v1/patients/{patient}?confirm=AU-1")).raise_for_status()
         html = (await client.get("/audit")).text
     assert "AU-1" not in html

@@ -25,23 +25,23 @@ YEAR = 1950
 
 @keep
 def files(patient: str, start_s: float | None = None) -> dict[str, bytes]:
-    made = simulate_tug(patient, 1, setup=replace(ON_SKIN, worn=("pelvis",)))
-    return analysis_files(analyse(replace(made.recording, test_limits=GivenLimits(start_s))))
+    simulation = simulate_tug(patient, 1, setup=replace(ON_SKIN, worn=("pelvis",)))
+    return analysis_files(analyse(replace(simulation.recording, test_limits=GivenLimits(start_s))))
 
 
 @pytest.fixture(scope="module")
 async def visits(clinic: Clinic) -> list[str]:
     """Two visits of one person, the second one corrected by hand."""
-    found = []
+    result = []
     async with clinic.client("admin") as client:
-        who = {"code": "TUG", "birth_year": YEAR}
-        patient = (await client.post("/api/v1/patients", json=who)).json()["id"]
+        user = {"code": "TUG", "birth_year": YEAR}
+        patient = (await client.post("/api/v1/patients", json=user)).json()["id"]
         for day, content in (("2026-01-10", files("elderly")), ("2026-03-10", files("healthy", 3.0))):
-            asked = {"title": "Up and go", "protocol": "tug", "performed_on": day}
-            made = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()
-            analysed.finish(clinic, patient, made["id"], content)
-            found.append(str(made["id"]))
-    return found
+            requests = {"title": "Up and go", "protocol": "tug", "performed_on": day}
+            body = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()
+            analysed.finish(clinic, patient, body["id"], content)
+            result.append(str(body["id"]))
+    return result
 
 
 async def page(clinic: Clinic, path: str) -> str:
@@ -88,13 +88,13 @@ async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
 ) -> None:
     html = await page(clinic, f"/sessions/{visits[1]}")
     card = card_of(html)
-    before = card[card.index("Visit before") :]
-    assert re.search(r'class="v">2[01]\.\d<', before)
+    initial = card[card.index("Visit before") :]
+    assert re.search(r'class="v">2[01]\.\d<', initial)
     assert "start and end confirmed or set manually" in card
     assert "No strides" not in html
-    said = re.search(r'name="manifest" data-type="json" value="(.*?)"', card)
-    assert said is not None
-    assert "test_limits" not in json.loads(escaped.unescape(said.group(1)))
+    match = re.search(r'name="manifest" data-type="json" value="(.*?)"', card)
+    assert match is not None
+    assert "test_limits" not in json.loads(escaped.unescape(match.group(1)))
     assert 'name="manifest.test_limits.start_s"' in card
     assert 'value="3.00"' in card
 
@@ -106,19 +106,19 @@ async def test_the_other_pages_of_the_session_open(clinic: Clinic, visits: list[
 
 async def test_the_api_tells_the_test(clinic: Clinic, visits: list[str]) -> None:
     async with clinic.client("admin") as client:
-        found = (await client.get(f"/api/v1/sessions/{visits[1]}/report")).json()
-    test = found["functional"]
+        body = (await client.get(f"/api/v1/sessions/{visits[1]}/report")).json()
+    test = body["functional"]
     assert [s["label"] for s in test["segments"]][:2] == ["Rising", "Walk out"]
     assert test["corrected"]
-    assert found["quality"]["kind"] == "ok"
-    rows = {p["name"]: p for p in found["parameters"]}
+    assert body["quality"]["kind"] == "ok"
+    rows = {p["name"]: p for p in body["parameters"]}
     assert rows["tug_duration_s"]["both"]["uncertainty"] > 0.0
 
 
 async def test_a_new_visit_offers_the_tests(clinic: Clinic) -> None:
     async with clinic.client("admin") as client:
-        made = await client.post("/api/v1/patients", json={"code": "NEW"})
-        html = (await client.get(f"/patients/{made.json()['id']}/sessions/new")).text
+        response = await client.post("/api/v1/patients", json={"code": "NEW"})
+        html = (await client.get(f"/patients/{response.json()['id']}/sessions/new")).text
     for name in ("tug", "five_sit_to_stand", "walk_10m", "walk_6min", "standing_eyes_open"):
         assert f'value="{name}"' in html
 

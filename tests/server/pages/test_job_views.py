@@ -31,19 +31,19 @@ def job(state: Any) -> JobView:
 
 @pytest.mark.parametrize("state", ["queued", "running", "done", "failed", "cancelled"])
 def test_a_job_is_followed_until_it_ends(state: str) -> None:
-    shown = view_job(job(state))
-    assert (shown["active"], shown["live"]) == ((state in {"queued", "running"}),) * 2
-    assert (shown["state"], shown["kind"]) == (state, "analyse")
+    view = view_job(job(state))
+    assert (view["active"], view["live"]) == ((state in {"queued", "running"}),) * 2
+    assert (view["state"], view["kind"]) == (state, "analyse")
 
 
 def test_of_many_only_a_few_are_followed_and_those_that_run_first() -> None:
     states = ["queued", "done", "queued", "queued", "running", "queued"]
-    shown: list[dict[str, Any] | None] = [*(view_job(job(s)) for s in states), None]
-    follow_few(shown)
-    followed = [k for k, j in enumerate(shown) if j is not None and j["live"]]
+    view: list[dict[str, Any] | None] = [*(view_job(job(s)) for s in states), None]
+    follow_few(view)
+    followed = [k for k, j in enumerate(view) if j is not None and j["live"]]
     assert followed == [0, 2, 4]
     assert len(followed) == FOLLOWED
-    assert [k for k, j in enumerate(shown) if j is not None and j["active"]] == [0, 2, 3, 4, 5]
+    assert [k for k, j in enumerate(view) if j is not None and j["active"]] == [0, 2, 3, 4, 5]
 
 
 async def test_what_runs_beside_an_analysis_is_no_news_of_the_session(clinic: Clinic) -> None:
@@ -66,12 +66,12 @@ async def test_what_runs_beside_an_analysis_is_no_news_of_the_session(clinic: Cl
         upload.write(b"more")
         upload.keep()
     with clinic.db.write() as c:
-        asked = recordings.inspect(c, state.queue, None, session)
+        requests = recordings.inspect(c, state.queue, None, session)
     with clinic.db.read() as c:
-        found = find_active_jobs(c, [patient], lambda j: j.session_id)
+        active_jobs = find_active_jobs(c, [patient], lambda j: j.session_id)
         assert find_active_jobs(c, [patient], lambda j: j.patient_id).keys() == {patient}
         assert find_active_jobs(c, [], lambda j: j.session_id) == {}
-    assert [(key, j["id"], j["live"]) for key, j in found.items()] == [(session, asked.id, True)]
+    assert [(key, j["id"], j["live"]) for key, j in active_jobs.items()] == [(session, requests.id, True)]
 
 
 def find_nothing(clinic: Clinic, session: str) -> JobView | None:

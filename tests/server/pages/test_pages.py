@@ -27,10 +27,10 @@ async def visit(clinic: Clinic, code: str, **changed: Any) -> tuple[str, str]:
         patient = (await client.post("/api/v1/patients", json={"code": code})).json()["id"]
         session = (await client.post(f"/api/v1/patients/{patient}/sessions", json={"title": "Walk"})).json()
     files = dict(analysed.files())
-    found = json.loads(files["analysis.json"])
+    document = json.loads(files["analysis.json"])
     for key, value in changed.items():
-        found[key] = {**found[key], **value} if isinstance(value, dict) else value
-    files["analysis.json"] = json.dumps(found).encode()
+        document[key] = {**document[key], **value} if isinstance(value, dict) else value
+    files["analysis.json"] = json.dumps(document).encode()
     analysed.finish(clinic, patient, session["id"], files)
     return patient, session["id"]
 
@@ -145,16 +145,16 @@ async def test_files_that_were_changed_after_the_analysis_are_not_taken_for_its_
     assert "exactly as uploaded" in await page(clinic, f"{path}/data")
     async with clinic.client("clinician") as client:
         put = await client.put(f"/api/v1{path}/files/walk.txt", content=b"another one")
-        asked = await client.post(f"/api/v1{path}/inspections")
-    assert (put.status_code, asked.status_code) == (201, 202)
+        requested_response = await client.post(f"/api/v1{path}/inspections")
+    assert (put.status_code, requested_response.status_code) == (201, 202)
     assert "Changed files are read" in await page(clinic, path)
     queue = clinic.app.state.queue
     claim = queue.claim("test", [recordings.INSPECT])
     assert queue.finish(claim, lambda c: None)
     assert note in await page(clinic, path)
-    told = await page(clinic, f"{path}/data")
-    assert "changed after this analysis; the files it used are in the archive" in told
-    assert "exactly as uploaded" not in told
+    messages = await page(clinic, f"{path}/data")
+    assert "changed after this analysis; the files it used are in the archive" in messages
+    assert "exactly as uploaded" not in messages
 
 
 async def test_the_numbers_after_an_edit_are_no_page_of_their_own(clinic: Clinic) -> None:
@@ -179,23 +179,23 @@ async def test_every_page_assumes_the_same_height(clinic: Clinic) -> None:
     words = f"without it {NOMINAL_HEIGHT_M:.2f} m is assumed"
     assert words in (await page(clinic, f"/patients/{patient}/sessions/new")).lower()
     templates = ROOT / "web" / "templates"
-    said = {p.name: re.findall(r"\d\.\d\d m\b", p.read_text()) for p in templates.glob("*.html")}
-    assert not {name: heights for name, heights in said.items() if heights}, "written by hand"
+    by_name = {p.name: re.findall(r"\d\.\d\d m\b", p.read_text()) for p in templates.glob("*.html")}
+    assert not {name: heights for name, heights in by_name.items() if heights}, "written by hand"
     assert "ASSUMED_HEIGHT ~ ' is assumed" in (templates / "_sensor_map.html").read_text()
 
 
 def test_tablet_and_therapist_are_told_to_stand_as_long_as_the_server_waits() -> None:
     static = ROOT / "web" / "static" / "js"
-    (told,) = re.findall(r"STAND_S = (\d+)", (static / "common/standing.js").read_text())
-    assert float(told) == CalibratingParams().stand_s
+    (matches,) = re.findall(r"STAND_S = (\d+)", (static / "common/standing.js").read_text())
+    assert float(matches) == CalibratingParams().stand_s
     by_hand = [
         path.name
         for path in (*static.rglob("*.js"), *(ROOT / "web" / "templates").glob("*.html"))
         if re.search(r"\d seconds", path.read_text())
     ]
     assert by_hand == []
-    shown = [p.name for p in static.rglob("*.js") if "${STAND_S} seconds" in p.read_text()]
-    assert sorted(shown) == ["calibration.js", "view.js", "words.js"]
+    visible_names = [p.name for p in static.rglob("*.js") if "${STAND_S} seconds" in p.read_text()]
+    assert sorted(visible_names) == ["calibration.js", "view.js", "words.js"]
 
 
 async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic: Clinic) -> None:
@@ -205,11 +205,11 @@ async def test_the_overview_is_light_and_the_rest_comes_when_it_is_opened(clinic
     assert "Compared with norm" in overview
     names = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', overview))
     values = await page(clinic, f"/sessions/{session}/values")
-    others = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))
+    other_names = set(re.findall(r'class="plain" href="[^"]*/parameters/(\w+)"', values))
     assert len(names) == 9
     assert 'kinematics#h-map">Sagittal profile score' in overview, "the tenth"
-    assert others > {"swing_time_s", "turning_angle_deg"}
-    assert not names & others
+    assert other_names > {"swing_time_s", "turning_angle_deg"}
+    assert not names & other_names
 
 
 async def test_a_report_is_drawn_once_until_something_it_shows_changes(
@@ -239,9 +239,9 @@ async def test_a_sentence_leads_to_what_proves_it_and_its_number_stands_there(cl
     _, session = await visit(clinic, "RANK")
     overview = await page(clinic, f"/sessions/{session}")
     values = await page(clinic, f"/sessions/{session}/values")
-    said = re.findall(r'href="([^"]*)">\s*<span class="rank"[^>]*>(\d)<', overview)
-    assert said
-    proofs = {rank: address for address, rank in said}
+    matches = re.findall(r'href="([^"]*)">\s*<span class="rank"[^>]*>(\d)<', overview)
+    assert matches
+    proofs = {rank: address for address, rank in matches}
     rows = re.findall(
         r'<span class="rank"[^>]*>(\d)</span>\s*<a class="plain" href="([^"]*)"', overview + values
     )

@@ -1,4 +1,4 @@
-"""What a service refuses is said on a German page in German, with its values."""
+"""Refusals of services are translated on German pages, with their values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.anyio
 
 def _refuse(c: Connection, patient: str) -> list[ServiceError]:
     """Refusals as the services make them, each of another form."""
-    found = []
+    result = []
     for attempt in (
         lambda: patients.get(c, "0" * 32),
         lambda: report_links.get(c, "0" * 32),
@@ -33,18 +33,18 @@ def _refuse(c: Connection, patient: str) -> list[ServiceError]:
     ):
         with pytest.raises(ServiceError) as refused:
             attempt()
-        found.append(refused.value)
-    return found
+        result.append(refused.value)
+    return result
 
 
 def test_every_language_says_the_common_refusals(source: Path | str) -> None:
     db = Database(source)
     with db.write() as c:
-        said = _refuse(c, patients.create(c, None, code="P-1").id)
+        refuse = _refuse(c, patients.create(c, None, code="P-1").id)
     db.close()
     for language in set(LANGUAGES) - {SOURCE}:
         catalogue, scripts = load_catalogue(language), script_texts(language)[1].decode()
-        for error in said:
+        for error in refuse:
             text = catalogue.find(error.message)
             assert text is not None, error.message
             # what was given stands in it, and nothing of the English does
@@ -57,9 +57,9 @@ def test_every_language_says_the_common_refusals(source: Path | str) -> None:
 async def test_the_page_of_a_refusal_is_german(tmp_path: Path) -> None:
     async with open_clinic(tmp_path) as clinic, clinic.client(Role.CLINICIAN) as client:
         address = f"/patients/{'0' * 32}"
-        wanted = {"accept": "text/html", "accept-language": "de"}
-        german = await client.get(address, headers=wanted)
-        english = await client.get(address, headers=wanted | {"accept-language": "en"})
+        expected = {"accept": "text/html", "accept-language": "de"}
+        german = await client.get(address, headers=expected)
+        english = await client.get(address, headers=expected | {"accept-language": "en"})
     message = NotFound("patient", "0" * 32).message
     assert (german.status_code, english.status_code) == (404, 404)
     assert message.split(",")[1] in english.text

@@ -33,11 +33,11 @@ async def walk(clinic: Clinic) -> str:
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "R-1"})).json()["id"]
         session = (await client.post(f"/api/v1/patients/{patient}/sessions", json={"title": "Walk"})).json()
-    found = json.loads(analysed.files()["analysis.json"]) | {"setup": SETUP}
+    result = json.loads(analysed.files()["analysis.json"]) | {"setup": SETUP}
     repaired = {**STATED, "protocol": "walk", "subject": {"height_m": 1.7}, "corrections": CORRECTED}
     files = {
         **analysed.files(),
-        "analysis.json": json.dumps(found).encode(),
+        "analysis.json": json.dumps(result).encode(),
         REPAIRED: json.dumps(repaired).encode(),
     }
     analysed.finish(clinic, patient, session["id"], files, STATED)
@@ -50,8 +50,8 @@ async def read(clinic: Clinic, path: str, role: str = "admin") -> str:
 
 
 def find_hidden(page: str, name: str) -> Any:
-    found = re.search(rf'name="{name}" data-type="json"\s+value="([^"]*)"', page)
-    return None if found is None else json.loads(html.unescape(found[1]))
+    match = re.search(rf'name="{name}" data-type="json"\s+value="([^"]*)"', page)
+    return None if match is None else json.loads(html.unescape(match[1]))
 
 
 async def test_the_proposal_is_shown_and_holds_the_set_up_alone(clinic: Clinic) -> None:
@@ -71,8 +71,10 @@ async def test_confirming_it_asks_for_an_analysis_and_the_earlier_set_up_can_be_
     session = await walk(clinic)
     manifest = find_hidden(await read(clinic, f"/sessions/{session}"), "manifest")
     async with clinic.client("admin") as client:
-        asked = await client.post(f"/api/v1/sessions/{session}/analyses", json={"manifest": manifest})
-        assert asked.status_code == 202
+        requested_response = await client.post(
+            f"/api/v1/sessions/{session}/analyses", json={"manifest": manifest}
+        )
+        assert requested_response.status_code == 202
     analysed.publish_next(clinic, session)
     assert find_hidden(await read(clinic, f"/sessions/{session}"), "manifest") is None
     page = await read(clinic, f"/sessions/{session}/data")

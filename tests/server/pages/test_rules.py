@@ -1,6 +1,6 @@
-"""Pages and papers of every simulated patient show every rule at every rank, in every language.
+"""Pages and prints of every simulated patient with every rule at every rank, in every language.
 
-An everyday run has one patient, and every rule once among what is shown and once among what has no room.
+The default run covers one patient, with every rule once among displayed and once among omitted findings.
 """
 
 from __future__ import annotations
@@ -61,23 +61,23 @@ class Shown:
 
     def write(self, language: str, report: Mapping[str, Any] | None = None) -> str:
         changed = {} if report is None else {"report": {**self.context["report"], **report}}
-        made = TEMPLATES[language].get_template(self.template)
-        return made.render({**self.context, **changed})
+        result = TEMPLATES[language].get_template(self.template)
+        return result.render({**self.context, **changed})
 
 
 @pytest.fixture
 def pages(monkeypatch: pytest.MonkeyPatch) -> dict[str, Shown]:
     """What pages that are opened from now on are made of, by template."""
-    found: dict[str, Shown] = {}
+    result: dict[str, Shown] = {}
 
     def look(
-        request: Request, template: str, context: Mapping[str, Any], *rest: Any, **others: Any
+        request: Request, template: str, context: Mapping[str, Any], *remainder: Any, **others: Any
     ) -> Response:
-        found[template] = Shown(template, {**context, "request": request})
-        return render(request, template, context, *rest, **others)
+        result[template] = Shown(template, {**context, "request": request})
+        return render(request, template, context, *remainder, **others)
 
     monkeypatch.setattr(shell, "render", look)
-    return found
+    return result
 
 
 async def open_pages(clinic: Clinic, name: str) -> None:
@@ -106,26 +106,26 @@ def raise_flags(rule: Rule, sides: Sequence[Side]) -> list[Flag]:
     """The rule beyond its limit on these sides, all others unknown."""
     limit = 10.0 if rule.limit is None else rule.limit
     value = limit * 1.5 if rule.beyond == "above" else limit - abs(limit) - 1.0
-    made = []
-    for other in RULES:
+    result = []
+    for second in RULES:
         for side in SIDES:
-            beyond = other is rule and side in sides
-            made.append(
+            beyond = second is rule and side in sides
+            result.append(
                 Flag(
-                    other.name, side, other.measure, other.kind, value if beyond else None, other.unit,
-                    limit if beyond else other.limit, other.beyond, True if beyond else None, other.source,
-                    verified=other.verified, n=20, marked=beyond,
-                    zero="standing" if other.measure in CURVES else None,
+                    second.name, side, second.measure, second.kind, value if beyond else None, second.unit,
+                    limit if beyond else second.limit, second.beyond, True if beyond else None, second.source,
+                    verified=second.verified, n=20, marked=beyond,
+                    zero="standing" if second.measure in CURVES else None,
                     reason=None if beyond else "no_strides", spread=1.0, certain=beyond,
                 )
             )  # fmt: skip
-    return made
+    return result
 
 
 def speak(rule: Rule, flags: Sequence[Flag], sides: Sequence[Side]) -> HeadlineSentence:
     """The sentence of a rule: its own where it has one, else one about the same figure."""
     own = find_standouts((), Norms(None, None), flags)[0]
-    other = HeadlineSentence(
+    second = HeadlineSentence(
         rule.measure,
         sides[0] if len(sides) == 1 else None,
         "trunk",
@@ -136,17 +136,17 @@ def speak(rule: Rule, flags: Sequence[Flag], sides: Sequence[Side]) -> HeadlineS
         "",
         "limits",
     )
-    return own[0] if own else other
+    return own[0] if own else second
 
 
-def fill_headline(before: Headline, sentence: HeadlineSentence, rank: int) -> Headline:
+def fill_headline(earlier: Headline, sentence: HeadlineSentence, rank: int) -> Headline:
     """A headline of as many sentences as there are ranks, this one at its rank."""
-    there = [*before.stands_out]
-    while len(there) < len(RANKS):
-        there.append(
+    target = [*earlier.stands_out]
+    while len(target) < len(RANKS):
+        target.append(
             HeadlineSentence("step_length_m", "left", "step", "sides", 2.0, "The ", "left", " step", "sides")
         )
-    return replace(before, stands_out=(*there[:rank], sentence, *there[rank : len(RANKS) - 1]))
+    return replace(earlier, stands_out=(*target[:rank], sentence, *target[rank : len(RANKS) - 1]))
 
 
 def list_cases(*, whole: bool) -> list[tuple[Rule, int, tuple[Side, ...]]]:
@@ -164,7 +164,7 @@ def list_cases(*, whole: bool) -> list[tuple[Rule, int, tuple[Side, ...]]]:
 def vary(
     cases: Iterable[tuple[Rule, int, tuple[Side, ...]]], report: Mapping[str, Any]
 ) -> Iterable[tuple[Rule, int, dict[str, Any]]]:
-    """What a page shows of each case in place of its own findings."""
+    """Page content for each case with the given findings."""
     for rule, rank, sides in cases:
         flags = raise_flags(rule, sides)
         headline = fill_headline(report["headline"], speak(rule, flags, sides), rank)
@@ -225,10 +225,10 @@ async def test_every_rule_is_in_the_pdf(clinic: Clinic, pages: dict[str, Shown])
     if ctypes.util.find_library("pangoft2-1.0") is None:
         pytest.skip("the system library Pango is not installed")
     await open_pages(clinic, NAMES[0])
-    shown, language = pages["print.html"], itertools.cycle(LANGUAGES)
+    view, language = pages["print.html"], itertools.cycle(LANGUAGES)
     with_room, without = (list_cases(whole=False)[i::2] for i in range(2))
     cases = [pair[i % 2] for i, pair in enumerate(zip(with_room, without, strict=True))]
-    for _, _, changed in vary(cases, shown.context["report"]):
-        context = {**shown.context, "report": {**shown.context["report"], **changed}}
-        html = paper.write_document(next(language), shown.template, context)
+    for _, _, changed in vary(cases, view.context["report"]):
+        context = {**view.context, "report": {**view.context["report"], **changed}}
+        html = paper.write_document(next(language), view.template, context)
         assert render_pdf(html.decode()).startswith(b"%PDF")

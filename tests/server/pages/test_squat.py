@@ -29,10 +29,10 @@ async def session(clinic: Clinic) -> str:
     files["repetitions.csv"] = "\n".join(rows).encode()
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "SQUAT"})).json()["id"]
-        asked = {"title": "Squats", "protocol": "squat"}
-        made = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()
-    analysed.finish(clinic, patient, made["id"], files)
-    return str(made["id"])
+        requests = {"title": "Squats", "protocol": "squat"}
+        body = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()
+    analysed.finish(clinic, patient, body["id"], files)
+    return str(body["id"])
 
 
 async def page(clinic: Clinic, path: str) -> str:
@@ -102,12 +102,12 @@ async def test_the_form_of_a_new_visit_offers_squats(clinic: Clinic, session: st
 
 async def test_the_api_tells_the_squats(clinic: Clinic, session: str) -> None:
     async with clinic.client("admin") as client:
-        found = (await client.get(f"/api/v1/sessions/{session}/report")).json()
-    assert found["squats"]["sides"] == ["left"]
-    assert found["squats"]["used"] == {"left": 2}
-    assert [r["excluded"] for r in found["squats"]["repetitions"]] == [None, "the foot moved", None]
-    assert "squat_depth_deg" in {p["name"] for p in found["parameters"]}
-    assert json.dumps(found["squats"])
+        body = (await client.get(f"/api/v1/sessions/{session}/report")).json()
+    assert body["squats"]["sides"] == ["left"]
+    assert body["squats"]["used"] == {"left": 2}
+    assert [r["excluded"] for r in body["squats"]["repetitions"]] == [None, "the foot moved", None]
+    assert "squat_depth_deg" in {p["name"] for p in body["parameters"]}
+    assert json.dumps(body["squats"])
 
 
 @pytest.fixture(scope="module")
@@ -115,12 +115,12 @@ async def both(clinic: Clinic) -> str:
     """A visit with squats of both legs in one take."""
     squats = Squats(repetitions=2, other="lifted", hinged=True)
     setup = RecordingSetup(rate_hz=50.0, noise=MEMS)
-    made = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, squats.sides))
+    result = simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, squats.sides))
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "BOTH"})).json()["id"]
-        asked = {"title": "Squats", "protocol": "squat"}
-        session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()["id"]
-    analysed.finish(clinic, patient, session, analysis_files(analyse(made.recording)))
+        requests = {"title": "Squats", "protocol": "squat"}
+        session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()["id"]
+    analysed.finish(clinic, patient, session, analysis_files(analyse(result.recording)))
     return str(session)
 
 
@@ -135,9 +135,9 @@ async def test_both_legs_are_side_by_side(clinic: Clinic, both: str) -> None:
     assert "left mean of 2, right mean of 2 squats" in card
     assert "no squats: 1 of the left knee and 1 of the right knee." in card
     assert f'replay="/sessions/{both}/replay"' in html
-    told = json.loads(re.findall(r'id="replay-data">(.*?)</script>', html, re.DOTALL)[0])
-    assert [side for side, *_ in told["strides"]] == ["right", "right", "left", "left"]
-    assert set(told["curves"]["knee_flexion"]) == {"left", "right"}
+    document = json.loads(re.findall(r'id="replay-data">(.*?)</script>', html, re.DOTALL)[0])
+    assert [side for side, *_ in document["strides"]] == ["right", "right", "left", "left"]
+    assert set(document["curves"]["knee_flexion"]) == {"left", "right"}
     paper = await page(clinic, f"/sessions/{both}/print")
     assert "Squats, both legs" in paper
     assert "no stride" not in paper
@@ -161,8 +161,8 @@ async def test_squats_have_no_norm_columns_and_a_low_confidence_names_no_larger_
     assert "Compared with norm" not in values
     assert "grey box" not in values
     async with clinic.client("admin") as client:
-        found = (await client.get(f"/api/v1/sessions/{both}/report")).json()
-    rows = {p["name"]: p for p in found["parameters"]}
+        body = (await client.get(f"/api/v1/sessions/{both}/report")).json()
+    rows = {p["name"]: p for p in body["parameters"]}
     valgus = rows["squat_knee_valgus_bottom_deg"]
     assert valgus["low_confidence"]
     assert (valgus["difference"], valgus["symmetry"]) == (None, None)

@@ -58,7 +58,7 @@ TRAINED = {
 async def full(
     tmp_path_factory: pytest.TempPathFactory, anyio_backend: str
 ) -> AsyncIterator[tuple[Clinic, Mapping[str, str]]]:
-    """A clinic in which there is much of everything, and what stands for the parts of its addresses."""
+    """Clinic with much of everything, and values for the address parameters."""
     async with open_clinic(tmp_path_factory.mktemp("full")) as clinic:
         results = analysed.files()
         identities.make_key(clinic.db, clinic.settings.identity_key_file)
@@ -91,11 +91,13 @@ def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
     """A patient on many programmes with many prescriptions, empty visits and takes with cues."""
     cue = Cue(1, "left", 2.0, 3.0, 64.0, 0.0, "in", True, None, 0, 63.0, 65.0)
     with clinic.db.write() as c:
-        of = sessions.get(c, last)
+        response = sessions.get(c, last)
         for i in range(MANY):
-            sessions.create(c, None, of.patient_id, performed_on=of.performed_on - dt.timedelta(days=1))
-            written = prescriptions.write(c, clinic.app.state.reviewed, None, of.patient_id, TRAINED)
-            programmes.start(c, None, of.patient_id, starts_on=dt.date(1990 + i, 1, 4))
+            sessions.create(
+                c, None, response.patient_id, performed_on=response.performed_on - dt.timedelta(days=1)
+            )
+            written = prescriptions.write(c, clinic.app.state.reviewed, None, response.patient_id, TRAINED)
+            programmes.start(c, None, response.patient_id, starts_on=dt.date(1990 + i, 1, 4))
         took = c.execute(
             select(recording.c.id).join(analysis).where(recording.c.session_id == last)
         ).scalar_one()
@@ -111,7 +113,10 @@ def _train(clinic: Clinic, earlier: list[str], last: str) -> None:
             became = took if sid == last else None
             c.execute(
                 insert(live_take).values(
-                    **row, recording_id=became, created_at=of.created_at, finished_at=of.created_at
+                    **row,
+                    recording_id=became,
+                    created_at=response.created_at,
+                    finished_at=response.created_at,
                 )
             )
             live_events.add_event(c, None, take, "prescription", None, began)
@@ -125,8 +130,8 @@ async def asked(
     async with clinic.client(role) as client:
         await client.get(before)
         with crowd.statements() as sent:
-            given = await client.get(path, headers={FRAGMENT: "numbers"})
-    assert given.status_code == answer, given.text
+            response = await client.get(path, headers={FRAGMENT: "numbers"})
+    assert response.status_code == answer, response.text
     assert sent, "not even who asks was looked up"
     return sent
 

@@ -1,4 +1,4 @@
-"""The page that tells an administrator how the installation is."""
+"""System page for administrators."""
 
 from __future__ import annotations
 
@@ -73,10 +73,10 @@ async def test_who_has_not_come_for_years_is_listed(tmp_path: Path) -> None:
         assert "None." in (await admin.get("/system")).text
         today = now().date()
         for code, visit in (("OLD", move_years(today, -11)), ("NEW", move_years(today, -9)), ("NONE", None)):
-            made = (await admin.post("/api/v1/patients", json={"code": code})).json()["id"]
+            payload = (await admin.post("/api/v1/patients", json={"code": code})).json()["id"]
             if visit is not None:
                 body = {"title": "Walk", "performed_on": visit.isoformat()}
-                await admin.post(f"/api/v1/patients/{made}/sessions", json=body)
+                await admin.post(f"/api/v1/patients/{payload}/sessions", json=body)
         html = (await admin.get("/system")).text
         assert "Without a visit for 10 years" in html
         assert [code for code in ("OLD", "NEW", "NONE") if f">{code}</a>" in html] == ["OLD"]

@@ -131,7 +131,7 @@ class Hostile:
         return text
 
     def enter(self, c: Connection, table: Table) -> None:
-        """Put a text of its own into every row and text column of a table."""
+        """Put a unique text into every row and text column of a table."""
         columns = [column for column in table.c if isinstance(column.type, UserString)]
         keys = list(table.primary_key)
         for row in c.execute(select(*keys)).all():
@@ -139,25 +139,25 @@ class Hostile:
             c.execute(update(table).where(*mine).values({k.name: self.make(name_column(k)) for k in columns}))
 
 
-def add_missing(c: Connection, known: dict[str, str], others: Mapping[str, dict[str, Any]]) -> None:
+def add_missing(c: Connection, reference: dict[str, str], rest_of: Mapping[str, dict[str, Any]]) -> None:
     """Add a row to every table with user text that has none."""
     for table in metadata.sorted_tables:
         if not any(column in ENTERED for column in table.c) or c.execute(select(table)).first() is not None:
             continue
-        values = {column.name: find_value(column, known) for column in table.c if not column.nullable}
-        c.execute(insert(table).values(values | others.get(table.name, {})))
+        values = {column.name: find_value(column, reference) for column in table.c if not column.nullable}
+        c.execute(insert(table).values(values | rest_of.get(table.name, {})))
 
 
-def find_value(column: Column[Any], known: Mapping[str, str]) -> Any:
+def find_value(column: Column[Any], reference: Mapping[str, str]) -> Any:
     if column.foreign_keys:
-        return known[next(iter(column.foreign_keys)).column.table.name]
+        return reference[next(iter(column.foreign_keys)).column.table.name]
     kind = getattr(column.type, "impl_instance", column.type).python_type
     now = dt.datetime.now(dt.UTC)
-    made: dict[type, Any] = {
+    result: dict[type, Any] = {
         str: new_id(), int: 1, bool: True, dt.datetime: now, dt.date: now.date(), object: {},
         bytes: new_id().encode(),
     }  # fmt: skip
-    return made[kind]
+    return result[kind]
 
 
 NOT_CHANGED: Final = ("audit", "device_check")
@@ -179,7 +179,7 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
     """A clinic with everything that pages show, every text of which is hostile; parts of its addresses."""
     results = analysed.files()
     identities.make_key(clinic.db, clinic.settings.identity_key_file)
-    ((other, sid),) = crowd.fill(clinic, 1, 2, results)
+    ((second, sid),) = crowd.fill(clinic, 1, 2, results)
     with clinic.db.write() as c:
         c.execute(
             update(device_check)
@@ -192,10 +192,10 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
         clinic.user(name)
     async with clinic.client("admin") as client:
         of_patient, of_session = f"/api/v1/patients/{pid}", f"/api/v1/sessions/{sid}"
-        known = {name: hostile.make(f"identity.{name}") for name in identities.MOST}
+        reference = {name: hostile.make(f"identity.{name}") for name in identities.MOST}
         excluded = EXCLUDED | {"reason": hostile.make("edit.reason")}
         sent = [
-            await client.patch(f"{of_patient}/identity", json=known),
+            await client.patch(f"{of_patient}/identity", json=reference),
             await client.post(f"{of_patient}/prescriptions", json=TRAINED),
             await client.post(f"/sessions/{sid}/report/sign", json={}),
             await client.post(f"{of_session}/edits", json=excluded),
@@ -204,15 +204,15 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
         report_id = sent[2].json()["id"]
     now = dt.datetime.now(dt.UTC)
     with clinic.db.write() as c:
-        known = {
+        reference = {
             "patient": pid, "session": sid, "recording": recording_id, "user": clinic.users["admin"],
             "signed_report": report_id,
             "job": c.execute(select(job.c.id)).scalars().all()[0],
         }  # fmt: skip
         # a run without files is no page: it belongs to the other visit
         other_one = select(analysis.c.id).where(analysis.c.recording_id != recording_id)
-        known["analysis"] = c.execute(other_one).scalar_one()
-        others: dict[str, dict[str, Any]] = {
+        reference["analysis"] = c.execute(other_one).scalar_one()
+        remaining: dict[str, dict[str, Any]] = {
             "emergency_access": {"ends_at": now + dt.timedelta(hours=1)},
             "consent": {"purpose": "recording"},
             "session_video": {"media_type": "video/mp4", "sha256": "0" * 64},
@@ -222,20 +222,20 @@ async def fill(clinic: Clinic, hostile: Hostile) -> Mapping[str, str]:
         devices = [hostile.make(f"device {i} of the files") for i in range(2)]
         inspected = [device(devices[0], "pelvis"), device(devices[1], duplicate_of=devices[0])]
         inspected[0]["notices"] = [suspect(devices[0])]
-        found = {"devices": inspected, "duration_s": 25.0, "protocol": "walk", "notices": []}
+        result = {"devices": inspected, "duration_s": 25.0, "protocol": "walk", "notices": []}
         mapped = {"sensors": {devices[0]: "pelvis"}}
-        c.execute(update(recording).values(inspection=found, manifest=mapped))
+        c.execute(update(recording).values(inspection=result, manifest=mapped))
         c.execute(update(analysis).values(manifest=mapped))
         c.execute(insert(clinic_option).values(name="care_teams", since=now))
         c.execute(update(signed_report).values(reopened_at=now, reopened_because="x"))
-        add_missing(c, known, others)
+        add_missing(c, reference, remaining)
         for table in metadata.sorted_tables:
             if any(column in ENTERED for column in table.c) and table.name not in NOT_CHANGED:
                 hostile.enter(c, table)
     return {
         "pid": pid,
         "sid": sid,
-        "other": other,
+        "other": second,
         "name": "stance_pct",
         "report_id": report_id,
         "token": "x" * 43,
@@ -259,9 +259,9 @@ Pages = Mapping[str, Mapping[str, str]]
 async def hostile_pages(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory, anyio_backend: str
 ) -> tuple[Hostile, Pages]:
-    """Every page in English and in German, and the texts that may stand on them."""
+    """Every page in English and German, with the texts that may appear."""
     hostile = Hostile(request.param)
-    shown: dict[str, dict[str, str]] = {page: {} for page in PAGES}
+    visible_by_page: dict[str, dict[str, str]] = {page: {} for page in PAGES}
     async with open_clinic(tmp_path_factory.mktemp("hostile")) as clinic:
         values = await fill(clinic, hostile)
         async with clinic.client("admin") as client:
@@ -269,10 +269,10 @@ async def hostile_pages(
                 path = (page + QUERIES.get(page, "")).format(**values)
                 for language in ("en", "de"):
                     headers = {"Accept-Language": language, "Accept": "text/html", FRAGMENT: "numbers"}
-                    given = await client.get(path, headers=headers)
-                    assert given.status_code == ANSWERS.get(page, 200), path
-                    shown[page][language] = html.unescape(given.text)
-    return hostile, shown
+                    response = await client.get(path, headers=headers)
+                    assert response.status_code == ANSWERS.get(page, 200), path
+                    visible_by_page[page][language] = html.unescape(response.text)
+    return hostile, visible_by_page
 
 
 @pytest.mark.slow
@@ -287,26 +287,30 @@ def test_user_text_is_the_same_in_german(hostile_pages: tuple[Hostile, Pages], p
 
 def test_every_text_that_people_enter_was_on_a_page(hostile_pages: tuple[Hostile, Pages]) -> None:
     hostile, pages = hostile_pages
-    shown = {
+    visible_places = {
         place for text, place in hostile.places.items() if any(text in page["en"] for page in pages.values())
     }
-    assert set(hostile.places.values()) - shown == NOT_SHOWN
+    assert set(hostile.places.values()) - visible_places == NOT_SHOWN
 
 
 async def test_what_is_searched_for_stands_in_the_page_as_it_was_typed(tmp_path: Path) -> None:
     async with open_clinic(tmp_path) as clinic, clinic.client("admin") as client:
         for path in ("/patients", "/study"):
-            given = await client.get(path, params={"q": "Pain, left knee"}, headers={"Accept-Language": "de"})
-            assert 'value="Pain, left knee"' in given.text
-        given = await client.get("/patients", params={"q": "Training 2.5"}, headers={"Accept-Language": "de"})
-        assert "„Training 2.5“" in given.text
+            response = await client.get(
+                path, params={"q": "Pain, left knee"}, headers={"Accept-Language": "de"}
+            )
+            assert 'value="Pain, left knee"' in response.text
+        response = await client.get(
+            "/patients", params={"q": "Training 2.5"}, headers={"Accept-Language": "de"}
+        )
+        assert "„Training 2.5“" in response.text
 
 
 async def test_a_refusal_quotes_what_was_typed(tmp_path: Path) -> None:
     async with open_clinic(tmp_path) as clinic, clinic.client("admin") as client:
         headers = {"Accept-Language": "de", "Accept": "text/html"}
         await client.post("/api/v1/patients", json={"code": "Training 2.5"})
-        again = await client.post("/api/v1/patients", json={"code": "Training 2.5"})
-        assert "„Training 2.5“" in load_catalogue("de").translate(again.json()["detail"])
+        second_response = await client.post("/api/v1/patients", json={"code": "Training 2.5"})
+        assert "„Training 2.5“" in load_catalogue("de").translate(second_response.json()["detail"])
         missing = await client.get("/sensors/Saturated", headers=headers)
         assert "„Saturated“" in missing.text

@@ -49,9 +49,9 @@ def test_a_code_as_a_pattern_matches_itself_only(code: str) -> None:
 
 def test_every_result_file_has_words_on_the_data_page() -> None:
     documented = f"{exports.__doc__}\n{activity_files.__doc__}"
-    told = re.findall(r"^([a-z_]+\.(?:json|parquet|csv)) ", documented, re.MULTILINE)
-    assert len(told) >= 8
-    assert set(FILE_WORDS) == set(told)
+    matches = re.findall(r"^([a-z_]+\.(?:json|parquet|csv)) ", documented, re.MULTILINE)
+    assert len(matches) >= 8
+    assert set(FILE_WORDS) == set(matches)
 
 
 def test_every_stage_of_the_pipeline_has_words_in_its_order() -> None:

@@ -1,4 +1,4 @@
-"""What computes for long stands behind pages from its start."""
+"""Long computations run at lower priority than pages from the start."""
 
 from __future__ import annotations
 

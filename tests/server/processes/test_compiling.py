@@ -15,10 +15,10 @@ from sagittal.server.storage.compile_cache import VARIABLE, has_compiled_filters
 
 
 def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder, asked = tmp_path / "filters", []
+    folder, requests = tmp_path / "filters", []
 
     def compile_slowly(orders: object) -> None:
-        asked.append(orders)
+        requests.append(orders)
         time.sleep(0.05)
         (folder / "kernel.nbi").touch()
 
@@ -27,7 +27,7 @@ def test_of_many_that_ask_at_once_one_compiles(tmp_path: Path, monkeypatch: pyte
     with ThreadPoolExecutor(4) as pool:
         for done in [pool.submit(compiling.compile_filters_once, compiling.OFFLINE) for _ in range(4)]:
             done.result()
-    assert asked == [compiling.OFFLINE]
+    assert requests == [compiling.OFFLINE]
 
 
 def test_who_comes_in_the_middle_waits_for_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""A process that is always there: what it gets and says, and who comes after it."""
+"""Persistent child process: messages in both directions, and replacement."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ while head := line.read(8):
 
 
 class Kept:
-    """A kept process with all that it said, and how often it was mourned."""
+    """Persistent process with all its messages and the number of its losses."""
 
     def __init__(self, folder: Path, greetings: Iterable[bytes]) -> None:
         self.heard: asyncio.Queue[bytes] = asyncio.Queue()
@@ -53,69 +53,69 @@ class Kept:
 async def keep(folder: Path, monkeypatch: pytest.MonkeyPatch, *greetings: bytes) -> AsyncIterator[Kept]:
     (folder / "echo_for_tests.py").write_text(ECHO)
     monkeypatch.setenv("PYTHONPATH", str(folder))
-    kept = Kept(folder, greetings)
-    kept.process.start()
+    retained = Kept(folder, greetings)
+    retained.process.start()
     try:
-        yield kept
+        yield retained
     finally:
-        await kept.process.stop()
+        await retained.process.stop()
 
 
 async def test_it_is_greeted_heard_replaced_when_killed_and_gone_when_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async with keep(tmp_path, monkeypatch, b"good", b"morning") as kept:
-        assert not kept.process.is_connected
-        kept.process.send(b"lost, for there is nobody yet")
-        assert [await kept.next(), await kept.next()] == [b"good", b"morning"]
-        kept.process.send(b"and you")
-        assert await kept.next() == b"and you"
-        assert kept.process.backlog_bytes == 0
-        first = kept.process.pid
+    async with keep(tmp_path, monkeypatch, b"good", b"morning") as retained:
+        assert not retained.process.is_connected
+        retained.process.send(b"lost, for there is nobody yet")
+        assert [await retained.next(), await retained.next()] == [b"good", b"morning"]
+        retained.process.send(b"and you")
+        assert await retained.next() == b"and you"
+        assert retained.process.backlog_bytes == 0
+        first = retained.process.pid
         assert first is not None
-        kept.process.is_warm = True
+        retained.process.is_warm = True
         os.kill(first, signal.SIGKILL)
-        await asyncio.wait_for(kept.deaths.acquire(), PATIENCE_S)
-        assert not kept.process.is_warm
+        await asyncio.wait_for(retained.deaths.acquire(), PATIENCE_S)
+        assert not retained.process.is_warm
         # the first death is made good at once
-        assert [await kept.next(), await kept.next()] == [b"good", b"morning"]
-        second = kept.process.pid
+        assert [await retained.next(), await retained.next()] == [b"good", b"morning"]
+        second = retained.process.pid
         assert second not in {None, first}
-    assert kept.process.pid is None
-    assert not kept.process.is_connected
-    assert kept.deaths.locked()  # nobody mourns who was stopped
+    assert retained.process.pid is None
+    assert not retained.process.is_connected
+    assert retained.deaths.locked()  # nobody mourns who was stopped
 
 
 async def test_who_owes_an_answer_and_is_silent_is_replaced_but_only_when_warm(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(kept_process, "HUNG_S", 0.0)
-    async with keep(tmp_path, monkeypatch, b"hello") as kept:
-        await kept.next()
-        first = kept.process.pid
-        kept.process.is_warm = True
-        kept.process.end_if_hung()  # it owes nothing
-        kept.process.send(b"be silent")
-        kept.process.expect_answer()
-        kept.process.is_warm = False
-        kept.process.end_if_hung()  # it compiles
-        assert kept.process.pid == first
-        kept.process.is_warm = True
-        kept.process.end_if_hung()
-        await asyncio.wait_for(kept.deaths.acquire(), PATIENCE_S)
-        await kept.next()
-        assert kept.process.pid != first
+    async with keep(tmp_path, monkeypatch, b"hello") as retained:
+        await retained.next()
+        first = retained.process.pid
+        retained.process.is_warm = True
+        retained.process.end_if_hung()  # it owes nothing
+        retained.process.send(b"be silent")
+        retained.process.expect_answer()
+        retained.process.is_warm = False
+        retained.process.end_if_hung()  # it compiles
+        assert retained.process.pid == first
+        retained.process.is_warm = True
+        retained.process.end_if_hung()
+        await asyncio.wait_for(retained.deaths.acquire(), PATIENCE_S)
+        await retained.next()
+        assert retained.process.pid != first
 
 
 async def test_an_answer_settles_what_is_owed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kept_process, "HUNG_S", 0.0)
-    async with keep(tmp_path, monkeypatch) as kept:
-        while not kept.process.is_connected:
+    async with keep(tmp_path, monkeypatch) as retained:
+        while not retained.process.is_connected:
             await asyncio.sleep(0.01)
-        first = kept.process.pid
-        kept.process.is_warm = True
-        kept.process.expect_answer()
-        kept.process.send(b"here")
-        await kept.next()
-        kept.process.end_if_hung()
-        assert kept.process.pid == first
+        first = retained.process.pid
+        retained.process.is_warm = True
+        retained.process.expect_answer()
+        retained.process.send(b"here")
+        await retained.next()
+        retained.process.end_if_hung()
+        assert retained.process.pid == first

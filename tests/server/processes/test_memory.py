@@ -36,5 +36,7 @@ print(before - held_mb())
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="memory is read from /proc")
 def test_freed_memory_between_kept_memory_goes_back() -> None:
-    said = subprocess.run([sys.executable, "-c", HOLES], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert float(said.stdout) >= 30.0
+    result = subprocess.run(
+        [sys.executable, "-c", HOLES], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert float(result.stdout) >= 30.0

@@ -39,8 +39,8 @@ def take(
     return StudyTake(name, labels, 2, {"walk.txt": f"hash of {name}"}, error, analysis, lambda: strides)
 
 
-def rows(made: StudyTables, name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(io.StringIO(made.files[name].decode())))
+def rows(result: StudyTables, name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(result.files[name].decode())))
 
 
 REFUSED = InputError("missing_acc", "No acceleration.")
@@ -58,13 +58,13 @@ def test_a_take_is_a_row_with_its_means_and_a_refused_one_a_row_with_its_code() 
 
 
 def test_strides_have_the_labels_of_their_take_and_the_modelled_angles_of_their_side() -> None:
-    found = rows(MADE, "strides.csv")
-    assert MADE.strides == len(found) == 3
-    assert [(r["take"], r["sub"], r["side"]) for r in found] == [
+    result = rows(MADE, "strides.csv")
+    assert MADE.strides == len(result) == 3
+    assert [(r["take"], r["sub"], r["side"]) for r in result] == [
         ("a", "01", "left"), ("a", "01", "right"), ("a", "01", "left")
     ]  # fmt: skip
-    assert [r["estimated_angles"] for r in found] == ["knee_flexion_l", "hip_flexion_r", "knee_flexion_l"]
-    assert [r["stride_time_s"] for r in found] == ["1.1", "", "1.2"]
+    assert [r["estimated_angles"] for r in result] == ["knee_flexion_l", "hip_flexion_r", "knee_flexion_l"]
+    assert [r["stride_time_s"] for r in result] == ["1.1", "", "1.2"]
 
 
 def test_what_a_person_wrote_of_a_stride_stays_in_the_clinic() -> None:
@@ -83,20 +83,20 @@ def test_the_parquet_tables_hold_numbers_as_numbers() -> None:
 def test_failures_have_their_sentence_and_provenance_the_hash_of_every_file() -> None:
     assert rows(MADE, FAILURES) == [{"take": "b", "code": "missing_acc", "message": "No acceleration."}]
     assert MADE.failed == 1
-    found = json.loads(MADE.files[PROVENANCE])
-    assert found["written_by"] == "1.0"
-    assert found["takes"]["b"] == {"sha256": {"walk.txt": "hash of b"}, "error": "missing_acc"}
-    assert set(found["libraries"]) == {"numpy", "scipy", "numba", "pyarrow"}
+    document = json.loads(MADE.files[PROVENANCE])
+    assert document["written_by"] == "1.0"
+    assert document["takes"]["b"] == {"sha256": {"walk.txt": "hash of b"}, "error": "missing_acc"}
+    assert set(document["libraries"]) == {"numpy", "scipy", "numba", "pyarrow"}
 
 
 def test_a_column_of_numbers_and_words_is_one_of_words() -> None:
-    made = write_study([take("a", strides=None, age=60), take("b", strides=None, age="old")], {})
-    table = pq.read_table(io.BytesIO(made.files["takes.parquet"]))
+    study = write_study([take("a", strides=None, age=60), take("b", strides=None, age="old")], {})
+    table = pq.read_table(io.BytesIO(study.files["takes.parquet"]))
     assert table["age"].to_pylist() == ["60", "old"]
 
 
 def test_takes_without_strides_make_an_empty_table() -> None:
-    made = write_study([take("a", strides=None)], {})
-    assert (made.strides, made.failed) == (0, 0)
-    assert rows(made, "strides.csv") == []
-    assert pq.read_table(io.BytesIO(made.files["strides.parquet"])).num_rows == 0
+    study = write_study([take("a", strides=None)], {})
+    assert (study.strides, study.failed) == (0, 0)
+    assert rows(study, "strides.csv") == []
+    assert pq.read_table(io.BytesIO(study.files["strides.parquet"])).num_rows == 0

@@ -1,4 +1,4 @@
-"""One angle, one name: a norm stands behind a curve of its own zero only, and a title has one value."""
+"""Titles are unique per angle; norms are drawn only for curves with the same zero."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def test_a_curve_has_a_norm_band_of_its_own_zero_or_none(
 ) -> None:
     bundle = make_bundle()
     plain, model = report_model(bundle, age=40), measured(bundle, standing)
-    for before, p in zip(plain.panels, model.panels, strict=True):
-        assert before.norm is None, "what starts from standing has no anatomical band"
+    for initial, p in zip(plain.panels, model.panels, strict=True):
+        assert initial.norm is None, "what starts from standing has no anatomical band"
         assert p.norm is None or p.norm.zero == p.zero
         name = p.variable.name
         entered = [name] if name in PELVIS else [f"{name}_{SUFFIX[s]}" for s in SIDES]
@@ -56,7 +56,7 @@ def test_a_curve_has_a_norm_band_of_its_own_zero_or_none(
         if p.reason is None and level and name in adult_kinematics(40).bands:
             assert p.norm is not None
         for side, curve in p.sides.items():
-            at_zero = before.sides[side]
+            at_zero = initial.sides[side]
             assert curve.mean_deg is not None
             assert at_zero.mean_deg is not None
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
@@ -84,12 +84,12 @@ def test_the_figure_at_contact_is_where_its_curve_begins(bundle: Bundle) -> None
 @pytest.mark.parametrize("standing", [{}, STANDING, {"knee_flexion_l": 5.0}])
 def test_no_title_and_no_name_occurs_twice_in_a_report(bundle: Bundle, standing: dict[str, float]) -> None:
     model = measured(bundle, standing)
-    told = model.to_json()
-    rows, curves = told["parameters"], told["curves"]
+    notices = model.to_json()
+    rows, curves = notices["parameters"], notices["curves"]
     assert isinstance(rows, list)
     assert isinstance(curves, list)
-    for found in ([r["title"] for r in rows], [r["name"] for r in rows], [c["title"] for c in curves]):
-        assert max(Counter(found).values()) == 1
+    for result in ([r["title"] for r in rows], [r["name"] for r in rows], [c["title"] for c in curves]):
+        assert max(Counter(result).values()) == 1
     lines = list(csv.DictReader(io.StringIO(parameters_csv(model).decode())))
     assert max(Counter((r["name"], r["side"]) for r in lines).values()) == 1
     zeros = {c["variable"]: c["zero"] for c in curves}
@@ -108,8 +108,8 @@ def test_why_there_is_no_band_is_said_once(bundle: Bundle) -> None:
 
 def test_own_controls_from_standing_give_curves_from_standing_their_band(bundle: Bundle) -> None:
     assert bundle.angles is not None
-    kept = mean_curves(cycle_curves(bundle.angles, bundle.strides))
-    people = [ControlSession(f"c{i}", 40.0, "female", bundle.parameters, kept) for i in range(5)]
+    retained = mean_curves(cycle_curves(bundle.angles, bundle.strides))
+    people = [ControlSession(f"c{i}", 40.0, "female", bundle.parameters, retained) for i in range(5)]
     model = report_model(bundle, age=40, controls=control_group(people))
     for p in model.panels:
         assert p.reason is not None or (p.norm is not None and p.norm.zero == p.zero), p.variable.name
@@ -127,13 +127,13 @@ def test_an_estimated_angle_stays_from_standing_without_a_band(make_bundle: Make
 
 
 def test_two_visits_are_drawn_from_one_zero(bundle: Bundle) -> None:
-    plain, known = report_model(bundle, age=40), measured(bundle, STANDING)
-    for before, after in zip(plain.panels, known.panels, strict=True):
-        one, two = same_zero(before, after)
+    plain, known_measurement = report_model(bundle, age=40), measured(bundle, STANDING)
+    for initial, final in zip(plain.panels, known_measurement.panels, strict=True):
+        one, two = same_zero(initial, final)
         assert one.zero == two.zero
         assert two.norm is None
         for side in two.sides:
             assert two.sides[side].mean_deg == pytest.approx(one.sides[side].mean_deg)
-    hip = panel(known, "hip_flexion")
+    hip = panel(known_measurement, "hip_flexion")
     assert same_zero(hip, hip) == (hip, hip)
     assert hip.norm is not None

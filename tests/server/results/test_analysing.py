@@ -1,4 +1,4 @@
-"""A long take is worked on in blocks and lies in files: what comes of it is the same to the byte."""
+"""Long trials processed in blocks and spooled to files give identical bytes."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def walk() -> Recording:
 
 
 def work_out(walk: Recording) -> dict[str, object]:
-    """Every result file, in bytes, analysis.json without what is of the run."""
+    """Every result file in bytes, analysis.json without run-specific fields."""
     source = SourceFile.of_bytes("walk.parquet", write_recording(walk))
     files: dict[str, object] = dict(analysing.run([source], None, None, lambda stage, share: None))
-    told = files["analysis.json"]
-    assert isinstance(told, bytes)
-    return files | {"analysis.json": {k: v for k, v in json.loads(told).items() if k not in OF_THE_RUN}}
+    notices = files["analysis.json"]
+    assert isinstance(notices, bytes)
+    return files | {"analysis.json": {k: v for k, v in json.loads(notices).items() if k not in OF_THE_RUN}}
 
 
 @pytest.mark.sweep
@@ -48,8 +48,12 @@ def test_blocks_and_files_change_no_byte_of_a_result(
     walk: Recording, worn: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if worn in WORN:
-        kept = {device: s for device, s in walk.segments.items() if s in WORN[worn]}
-        walk = replace(walk, segments=kept, streams={device: walk.streams[device] for device in kept})
+        stored_by_device = {device: s for device, s in walk.segments.items() if s in WORN[worn]}
+        walk = replace(
+            walk,
+            segments=stored_by_device,
+            streams={device: walk.streams[device] for device in stored_by_device},
+        )
     whole = work_out(walk)
     samples = len(next(iter(walk.streams.values())).t_s)
     monkeypatch.setattr(held_samples, "SHORT", 100)

@@ -1,4 +1,4 @@
-"""What came of the feedback in a session: which visits belong together, or why there is nothing."""
+"""Feedback results of a session: related visits, or the reason for none."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ class Training:
 
     def gather(self, session: str) -> FeedbackRecords:
         with self.stored.db.read() as c:
-            who = patients.get(c, self.patient)
-            return gather(c, who, session, histories.list_analysed(c, self.patient))
+            response = patients.get(c, self.patient)
+            return gather(c, response, session, histories.list_analysed(c, self.patient))
 
 
 @pytest.fixture
@@ -64,10 +64,10 @@ def training(stored: Clinic) -> Training:
 
 
 def test_a_session_without_feedback_says_so(training: Training) -> None:
-    found = training.gather(training.walk(0, told=False))
-    assert (found.this, found.before, found.reason) == (None, None, "no_feedback")
-    assert found.reason in REASONS
-    assert view(training.stored.app.state.reviewed, found) is None
+    results = training.gather(training.walk(0, told=False))
+    assert (results.this, results.before, results.reason) == (None, None, "no_feedback")
+    assert results.reason in REASONS
+    assert view(training.stored.app.state.reviewed, results) is None
 
 
 def test_a_take_that_is_not_analysed_yet_and_an_analysis_of_another_recording(training: Training) -> None:
@@ -86,22 +86,26 @@ def test_a_training_is_held_against_the_last_one_before_it_that_was_walked_alike
     training.walk(2, pace="fast")
     second = training.walk(4)
     assert training.gather(oldest).before is None
-    found = training.gather(second)
-    assert found.this is not None
-    assert found.before is not None
-    assert (found.this.at.session.id, found.before.at.session.id) == (second, first)
-    shown = view(training.stored.app.state.reviewed, found)
-    assert shown is not None
-    assert {row.kind: row.n for row in shown.rows}["with"] == len(found.this.cues) - shown.split.left_out > 0
-    assert shown.split.unmatched == 0
-    assert shown.content.parameter == "stance_pct"
+    results = training.gather(second)
+    assert results.this is not None
+    assert results.before is not None
+    assert (results.this.at.session.id, results.before.at.session.id) == (second, first)
+    visible_view = view(training.stored.app.state.reviewed, results)
+    assert visible_view is not None
+    assert (
+        {row.kind: row.n for row in visible_view.rows}["with"]
+        == len(results.this.cues) - visible_view.split.left_out
+        > 0
+    )
+    assert visible_view.split.unmatched == 0
+    assert visible_view.content.parameter == "stance_pct"
 
 
 def test_the_limb_is_affected_or_not_where_both_are_known(stored: Clinic) -> None:
-    one, other = feedback.person(stored), feedback.person(stored, affected_side=None)
+    one, other_patient = feedback.person(stored), feedback.person(stored, affected_side=None)
     with stored.db.read() as c:
-        known, unknown = patients.get(c, one), patients.get(c, other)
-    assert _limb(known, "left") == "affected"
-    assert _limb(known, "right") == "unaffected"
-    assert _limb(known, None) is None
+        known_response, unknown = patients.get(c, one), patients.get(c, other_patient)
+    assert _limb(known_response, "left") == "affected"
+    assert _limb(known_response, "right") == "unaffected"
+    assert _limb(known_response, None) is None
     assert _limb(unknown, "left") is None

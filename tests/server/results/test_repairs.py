@@ -1,4 +1,4 @@
-"""Repairs of a set-up: what is proposed in sentences, and which manifest would put it right."""
+"""Corrections of a set-up: proposal texts, and the corrected manifest."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ def test_a_correction_is_said_unless_it_was_there_before() -> None:
 
 
 def test_how_a_sensor_is_worn_is_said_beside_what_was_declared() -> None:
-    wanted = {"mounting": {"pelvis": "back"}}
-    assert _list_changes(wanted, None) == ("The sensor of pelvis is worn “back”.",)
-    assert _list_changes(wanted, {"mounting": {"pelvis": "front"}}) == (
+    expected = {"mounting": {"pelvis": "back"}}
+    assert _list_changes(expected, None) == ("The sensor of pelvis is worn “back”.",)
+    assert _list_changes(expected, {"mounting": {"pelvis": "front"}}) == (
         "The sensor of pelvis is worn “back”, not “front”.",
     )
-    assert _list_changes(wanted, wanted) == ()
+    assert _list_changes(expected, expected) == ()
 
 
 def test_only_the_set_up_is_taken_over() -> None:
@@ -52,8 +52,8 @@ def test_only_the_set_up_is_taken_over() -> None:
         "corrections": {"A": {}},
         "sensors": {"A": "chest"},
     }
-    other = {"sensors": {"A": "pelvis"}, "mounting": {}, "protocol": "tug"}
-    assert take_setup(mine, other) == {
+    second = {"sensors": {"A": "pelvis"}, "mounting": {}, "protocol": "tug"}
+    assert take_setup(mine, second) == {
         "protocol": "walk", "subject": {"height_m": 1.7}, "sensors": {"A": "pelvis"}, "mounting": {}
     }  # fmt: skip
     assert take_setup(None, None) == {}
@@ -61,14 +61,14 @@ def test_only_the_set_up_is_taken_over() -> None:
 
 
 def proposing(stored: Clinic) -> AnalysisRecord:
-    """An analysis that says the feet are exchanged."""
-    found = json.loads(analysed.files()["analysis.json"]) | {
+    """Analysis that proposes to swap the feet."""
+    result = json.loads(analysed.files()["analysis.json"]) | {
         "setup": {"evidence": ["The feet are exchanged."]}
     }
     repaired = {"sensors": {"A": "foot_r", "B": "foot_l"}, "protocol": "tug"}
     files = {
         **analysed.files(),
-        "analysis.json": json.dumps(found).encode(),
+        "analysis.json": json.dumps(result).encode(),
         REPAIRED: json.dumps(repaired).encode(),
     }
     patient = feedback.person(stored)
@@ -82,10 +82,10 @@ def proposing(stored: Clinic) -> AnalysisRecord:
 def test_a_proposal_is_evidence_changes_and_the_manifest_of_the_session_with_that_set_up(
     stored: Clinic,
 ) -> None:
-    found = proposing(stored)
+    result = proposing(stored)
     with stored.db.read() as c:
-        proposal = read_proposal(c, stored.app.state.blobs, found)
-        without = read_without_limits(c, found)
+        proposal = read_proposal(c, stored.app.state.blobs, result)
+        without = read_without_limits(c, result)
     assert proposal is not None
     assert proposal.evidence == ("The feet are exchanged.",)
     assert proposal.changes == (
@@ -100,16 +100,16 @@ def test_a_proposal_is_evidence_changes_and_the_manifest_of_the_session_with_tha
 
 
 def test_files_that_are_no_longer_the_sessions_propose_nothing(stored: Clinic) -> None:
-    found = proposing(stored)
+    result = proposing(stored)
     state = (stored.db, stored.app.state.blobs, stored.settings)
-    with receiving.receive(*state, None, found.session_id, "walk.txt") as upload:
+    with receiving.receive(*state, None, result.session_id, "walk.txt") as upload:
         upload.write(b"another recording")
         upload.keep()
     with stored.db.read() as c:
-        current = recordings.require_current(c, found.session_id)
-        assert current.id != found.recording_id
-        assert read_proposal(c, stored.app.state.blobs, found) is None
-        assert read_without_limits(c, found) is None
+        current = recordings.require_current(c, result.session_id)
+        assert current.id != result.recording_id
+        assert read_proposal(c, stored.app.state.blobs, result) is None
+        assert read_without_limits(c, result) is None
 
 
 def test_an_analysis_without_a_repair_proposes_nothing(stored: Clinic) -> None:

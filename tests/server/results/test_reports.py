@@ -56,21 +56,21 @@ def test_a_number_is_opened_with_its_strides_and_an_edit_counts(
 ) -> None:
     patient, (first, _) = course
     reviewed = stored.app.state.reviewed
-    before = reports.behind_number(
+    initial = reports.behind_number(
         reviewed, first.found, first.edits, patient, first.session, "stride_time_s"
     )
-    counted = next(s for s in reviewed.open(first.found).bundle.strides.strides if s.excluded_reason is None)
-    edit = Edit("exclude_stride", counted.side, (counted.start_s + counted.end_s) / 2, reason="stumbled")
+    item = next(s for s in reviewed.open(first.found).bundle.strides.strides if s.excluded_reason is None)
+    edit = Edit("exclude_stride", item.side, (item.start_s + item.end_s) / 2, reason="stumbled")
     _, edits = reviews.make(stored.db, reviewed, None, first.session.id, edit)
-    after = reports.behind_number(reviewed, first.found, edits, patient, first.session, "stride_time_s")
-    assert before.row.name == "stride_time_s"
-    assert len(before.strides) == len(after.strides) > 0
+    final = reports.behind_number(reviewed, first.found, edits, patient, first.session, "stride_time_s")
+    assert initial.row.name == "stride_time_s"
+    assert len(initial.strides) == len(final.strides) > 0
 
     def n(one: object) -> int:
         row = one.row  # type: ignore[attr-defined]
         return sum(cell.n for cell in (row.left, row.right) if cell is not None)
 
-    assert n(after) == n(before) - 1
+    assert n(final) == n(initial) - 1
 
 
 def test_a_parameter_that_no_row_has_is_not_found(

@@ -40,8 +40,10 @@ def session_of(clinic: Clinic) -> str:
     return session
 
 
-def make(clinic: Clinic, session: str, edit: Edit, seen: int | None = None) -> edit_log.EditHistory:
-    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, base_version=seen)[1]
+def make(clinic: Clinic, session: str, edit: Edit, observations: int | None = None) -> edit_log.EditHistory:
+    return reviews.make(clinic.db, clinic.app.state.reviewed, None, session, edit, base_version=observations)[
+        1
+    ]
 
 
 def rows(clinic: Clinic) -> list[str]:
@@ -54,8 +56,8 @@ async def test_undo_is_a_row_and_nothing_is_ever_rewritten(clinic: Clinic) -> No
     session = session_of(clinic)
     make(clinic, session, MOVE)
     make(clinic, session, LEAVE_OUT)
-    _, after = reviews.undo(clinic.db, None, session)
-    assert after.edits == (MOVE,)
+    _, final = reviews.undo(clinic.db, None, session)
+    assert final.edits == (MOVE,)
     assert rows(clinic) == ["move_event", "exclude_stride", "undo"]
     with pytest.raises(DatabaseIntegrityError, match="append-only"), clinic.db.write() as c:
         c.execute(update(tables.edit).values(kind="undo"))
@@ -101,12 +103,12 @@ async def test_what_is_measured_is_kept_for_the_state_and_undo_finds_it_again(cl
     reviewed: ReviewedAnalyses = clinic.app.state.reviewed
     one = make(clinic, session, MOVE)
     with clinic.db.read() as c:
-        found = analyses.get_shown(c, session)
-    kept = reviewed.measure(found, one)
+        analysis = analyses.get_shown(c, session)
+    stored_measurement = reviewed.measure(analysis, one)
     make(clinic, session, LEAVE_OUT)
     _, back = reviews.undo(clinic.db, None, session)
     assert back.version != one.version
-    assert reviewed.measure(found, back) is kept
+    assert reviewed.measure(analysis, back) is stored_measurement
 
 
 async def test_an_erased_session_is_erased_from_memory_too(clinic: Clinic) -> None:

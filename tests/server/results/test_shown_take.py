@@ -33,13 +33,13 @@ def test_a_job_has_the_files_and_settings_of_the_analysis_and_its_own_parameters
         plain = submit_on_shown(
             c, stored.app.state.queue, None, found, "compare", "filters.asked", against=None, methods=["a"]
         )
-        given = c.execute(select(job.c.params).where(job.c.id == view.id)).scalar_one()
+        scalar_one = c.execute(select(job.c.params).where(job.c.id == view.id)).scalar_one()
         mine = recordings.get(c, found.recording_id)
         noted = c.execute(select(audit.c.action, audit.c.resource_id).order_by(audit.c.seq.desc())).first()
-    assert [f["name"] for f in given["files"]] == [*(f.name for f in mine.files), "reference.c3d"]
-    assert given["files"][-1] == {"name": "reference.c3d", "size": 5, "sha256": "c" * 64}
-    assert (given["analysis_id"], given["methods"]) == (found.id, ["a"])
-    assert given["manifest"] == (found.manifest or {})
+    assert [f["name"] for f in scalar_one["files"]] == [*(f.name for f in mine.files), "reference.c3d"]
+    assert scalar_one["files"][-1] == {"name": "reference.c3d", "size": 5, "sha256": "c" * 64}
+    assert (scalar_one["analysis_id"], scalar_one["methods"]) == (found.id, ["a"])
+    assert scalar_one["manifest"] == (found.manifest or {})
     assert (view.kind, view.recording_id) == ("compare", found.recording_id)
     assert plain.id != view.id
     assert noted is not None
@@ -49,7 +49,7 @@ def test_a_job_has_the_files_and_settings_of_the_analysis_and_its_own_parameters
 def test_the_same_job_is_done_once(stored: Clinic, found: AnalysisRecord) -> None:
     queue = stored.app.state.queue
     with stored.db.write() as c:
-        first, again, other, kind = (
+        first, second, alternative, kind = (
             submit_for(c, queue, None, found, kind, "asked", params).id
             for kind, params in (
                 ("export", {"a": 1, "b": 2}),
@@ -58,8 +58,8 @@ def test_the_same_job_is_done_once(stored: Clinic, found: AnalysisRecord) -> Non
                 ("tune", {}),
             )
         )
-    assert first == again
-    assert len({first, other, kind}) == 3
+    assert first == second
+    assert len({first, alternative, kind}) == 3
 
 
 def test_a_key_names_analysis_kind_and_parameters(found: AnalysisRecord) -> None:

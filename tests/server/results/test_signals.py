@@ -1,4 +1,4 @@
-"""Signals of a finished analysis, thinned to what a screen can show."""
+"""Signals of a finished analysis, thinned for display."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def test_parts_have_their_least_and_greatest_value_the_last_part_is_shorter() ->
 def test_a_lost_sample_hides_nothing_and_a_lost_part_is_none() -> None:
     low, high = _extremes(np.array([np.nan, 3.0, np.nan, np.nan]), 2)
     assert (low, high) == ([3.0, None], [3.0, None])
-    same, again = _extremes(np.array([0.12349, np.nan, np.inf]), 1)
-    assert same == again == [0.123, None, None]
+    same, second = _extremes(np.array([0.12349, np.nan, np.inf]), 1)
+    assert same == second == [0.123, None, None]
 
 
 @pytest.fixture(scope="module")
@@ -33,9 +33,9 @@ def found(stored: Clinic) -> AnalysisRecord:
 
 
 def window(
-    stored: Clinic, found: AnalysisRecord, name: str, start_s: float, end_s: float, points: int
+    stored: Clinic, result: AnalysisRecord, name: str, start_s: float, end_s: float, points: int
 ) -> SignalWindow:
-    return read_window(stored.app.state.reviewed, found, name, start_s, end_s, points)
+    return read_window(stored.app.state.reviewed, result, name, start_s, end_s, points)
 
 
 def test_feet_come_first_then_joints_then_sensors(stored: Clinic, found: AnalysisRecord) -> None:
@@ -47,11 +47,11 @@ def test_feet_come_first_then_joints_then_sensors(stored: Clinic, found: Analysi
     }
     raw = [lane.raw for lane in lanes]
     assert raw == sorted(raw)
-    by = {lane.name: lane for lane in lanes}
-    assert by["knee_flexion"].lines == ("left", "right")
-    assert by["pelvis_tilt"].lines == ("both",)
-    assert by["pelvis_acc"].lines == ("x", "y", "z")
-    assert (by["foot_rate"].unit, by["pelvis_acc"].unit) == ("°/s", "m/s²")
+    by_name = {lane.name: lane for lane in lanes}
+    assert by_name["knee_flexion"].lines == ("left", "right")
+    assert by_name["pelvis_tilt"].lines == ("both",)
+    assert by_name["pelvis_acc"].lines == ("x", "y", "z")
+    assert (by_name["foot_rate"].unit, by_name["pelvis_acc"].unit) == ("°/s", "m/s²")
 
 
 def test_a_window_has_the_samples_in_it_and_the_one_behind_each_end(
@@ -101,8 +101,8 @@ def test_a_lane_that_is_not_there_is_not_found(stored: Clinic, found: AnalysisRe
 def test_an_analysis_without_signals_still_has_its_angles(stored: Clinic) -> None:
     patient = feedback.person(stored)
     session = feedback.visit(stored, patient, 0)
-    kept = {n: x for n, x in analysed.files().items() if n not in {"signals.parquet", "tracks.parquet"}}
-    analysed.finish(stored, patient, session, kept)
+    retained = {n: x for n, x in analysed.files().items() if n not in {"signals.parquet", "tracks.parquet"}}
+    analysed.finish(stored, patient, session, retained)
     with stored.db.read() as c:
         bare = analyses.get_shown(c, session)
     lanes = list_lanes(stored.app.state.reviewed, bare)

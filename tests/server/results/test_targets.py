@@ -52,10 +52,10 @@ def test_a_target_that_is_entered_and_a_person_without_a_walk_are_offered_nothin
 
 
 def test_a_persons_own_side_is_a_target_with_its_strides_and_day() -> None:
-    found = offer(walk(step("left", 0.5), step("right", 0.6)), "own_baseline", NAME, "left").target
-    assert found is not None
-    assert (found.source, found.mean, found.sd, found.session_id) == ("own_baseline", 0.5, 0.02, "w")
-    assert found.words.startswith("left side, 10 strides on ")
+    target = offer(walk(step("left", 0.5), step("right", 0.6)), "own_baseline", NAME, "left").target
+    assert target is not None
+    assert (target.source, target.mean, target.sd, target.session_id) == ("own_baseline", 0.5, 0.02, "w")
+    assert target.words.startswith("left side, 10 strides on ")
 
 
 @pytest.mark.parametrize(
@@ -76,16 +76,16 @@ def test_the_better_side_is_the_other_one_where_it_is_ahead() -> None:
     assert ahead.target is not None
     assert (ahead.target.mean, ahead.target.words.split(",")[0]) == (0.6, "right side")
     for left in (0.6, 0.7):
-        behind = offer(walk(step("left", left), step("right", 0.6)), "own_better_side", NAME, "left")
-        assert behind.target is None
-        assert behind.reason is not None
-        assert behind.reason.startswith("The left side is the better one on ")
+        details = offer(walk(step("left", left), step("right", 0.6)), "own_better_side", NAME, "left")
+        assert details.target is None
+        assert details.reason is not None
+        assert details.reason.startswith("The left side is the better one on ")
 
 
 def test_neither_side_is_better_of_both_or_of_a_parameter_without_a_direction() -> None:
-    both = offer(walk(step("left", 0.5)), "own_better_side", NAME, None)
-    assert both.reason is not None
-    assert both.reason.startswith("Both sides are trained.")
+    pair = offer(walk(step("left", 0.5)), "own_better_side", NAME, None)
+    assert pair.reason is not None
+    assert pair.reason.startswith("Both sides are trained.")
     open_end = offer(walk(), "own_better_side", "knee_flexion_ic_deg", "left")
     assert open_end.reason is not None
     assert "neither higher nor lower is better by itself" in open_end.reason
@@ -93,11 +93,11 @@ def test_neither_side_is_better_of_both_or_of_a_parameter_without_a_direction() 
 
 def test_the_norm_at_this_speed_goes_before_that_of_the_pace_and_the_clinics_own() -> None:
     norms = Norms(None, None, values={NAME: norm(0.7)}, expected={NAME: norm(0.65, group="at this speed")})
-    found = offer(
+    target = offer(
         walk(norms=norms, own=Norms(None, None, values={NAME: norm(0.9)})), "norm", NAME, "left"
     ).target
-    assert found is not None
-    assert (found.mean, found.words) == (0.65, "at this speed, n = 30 (Somebody 2020)")
+    assert target is not None
+    assert (target.mean, target.words) == (0.65, "at this speed, n = 30 (Somebody 2020)")
     usual = replace(norms, expected={NAME: norm(0.65, comparable=False)})
     assert getattr(offer(walk(norms=usual), "norm", NAME, "left").target, "mean", None) == 0.7
     without = replace(norms, expected={NAME: norm(sd=0.0)}, values={})
@@ -112,12 +112,12 @@ def test_without_a_norm_the_reason_is_told() -> None:
     def reason(norms: Norms) -> str | None:
         return offer(walk(norms=norms), "norm", NAME, "left").reason
 
-    other = " Choose another source, or enter a target."
-    assert reason(Norms(None, None)) == f"There is no norm of this parameter.{other}"
+    alternative = " Choose another source, or enter a target."
+    assert reason(Norms(None, None)) == f"There is no norm of this parameter.{alternative}"
     unknown = Norms(None, None, timing_reason="age_unknown", reason="no_norm_for_age")
-    assert reason(unknown) == f"{NO_NORM['age_unknown']}{other}"
+    assert reason(unknown) == f"{NO_NORM['age_unknown']}{alternative}"
     unlike = Norms(None, None, values={NAME: norm(comparable=False, note="Not comparable.")})
-    assert reason(unlike) == f"Not comparable.{other}"
+    assert reason(unlike) == f"Not comparable.{alternative}"
 
 
 def test_a_value_of_both_sides_is_the_takes_own_or_both_together() -> None:
@@ -154,12 +154,12 @@ def test_the_last_walk_is_never_one_with_feedback(stored: Clinic) -> None:
     walked = feedback.walked(stored, patient, 0, 12.0)
     feedback.walked(stored, patient, 3, 12.0, feedback=True)
     with stored.db.read() as c:
-        who = patients.get(c, patient)
-        found = last_walk(c, stored.app.state.reviewed, who, with_controls=False)
+        response = patients.get(c, patient)
+        result = last_walk(c, stored.app.state.reviewed, response, with_controls=False)
         nothing = last_walk(c, stored.app.state.reviewed, patients.get(c, unseen))
-        other = last_walk(c, stored.app.state.reviewed, who, session_id="none")
-    assert found is not None
-    assert (found.session.id, found.own_controls()) == (walked, None)
-    assert found.session.performed_on == DAY
+        second = last_walk(c, stored.app.state.reviewed, response, session_id="none")
+    assert result is not None
+    assert (result.session.id, result.own_controls()) == (walked, None)
+    assert result.session.performed_on == DAY
     assert nothing is None
-    assert other is None
+    assert second is None

@@ -1,4 +1,4 @@
-"""Takes that are one visit, what a visit is compared with, and the newest speed of a list."""
+"""Trials that form a visit, the comparison visit, and the latest speed of a list."""
 
 from __future__ import annotations
 
@@ -31,20 +31,22 @@ DAY = dt.date(2026, 3, 2)
 
 
 def take(name: str, days: int = 0, minute: int = 0, **walked: Any) -> AnalysedSession:
-    known: dict[str, Any] = {
+    known_fields: dict[str, Any] = {
         "pace": None, "aid": None, "orthosis": None, "shoes": None, "feedback": False, "protocol": "walk"
     }  # fmt: skip
-    at = dt.datetime(2026, 3, 2, 9, minute, tzinfo=dt.UTC) + dt.timedelta(days=days)
+    position = dt.datetime(2026, 3, 2, 9, minute, tzinfo=dt.UTC) + dt.timedelta(days=days)
     session = Session(
         id=name, patient_id="p", patient_code="P-1", title=name, performed_on=DAY + dt.timedelta(days=days),
-        height_m=None, note="", created_at=at, has_video=False, state="done", **(known | walked),
+        height_m=None, note="", created_at=position, has_video=False, state="done", **(known_fields | walked),
     )  # fmt: skip
-    found = AnalysisRecord(f"analysis of {name}", "r", name, "p", "j", "", "", "1", None, {}, at, {})
-    return AnalysedSession(session, found, EditHistory())
+    analysis_record = AnalysisRecord(
+        f"analysis of {name}", "r", name, "p", "j", "", "", "1", None, {}, position, {}
+    )
+    return AnalysedSession(session, analysis_record, EditHistory())
 
 
-def names(found: list[ClinicVisit]) -> list[list[str]]:
-    return [[t.session.id for t in v.takes] for v in found]
+def names(result: list[ClinicVisit]) -> list[list[str]]:
+    return [[t.session.id for t in v.takes] for v in result]
 
 
 def test_takes_of_one_day_that_were_walked_alike_are_one_visit_in_the_order_they_were_made() -> None:
@@ -56,9 +58,9 @@ def test_takes_of_one_day_that_were_walked_alike_are_one_visit_in_the_order_they
 
 
 def test_a_take_with_feedback_is_a_visit_of_its_own() -> None:
-    plain, told = take("a"), take("b", minute=1, feedback=True)
-    assert not is_one_visit(plain, told)
-    assert is_one_visit(told, take("c", minute=2, feedback=True))
+    plain, trial = take("a"), take("b", minute=1, feedback=True)
+    assert not is_one_visit(plain, trial)
+    assert is_one_visit(trial, take("c", minute=2, feedback=True))
     assert not is_one_visit(plain, take("d", 1))
 
 
@@ -71,9 +73,9 @@ def test_a_visit_is_found_by_any_of_its_takes() -> None:
 
 
 def before(name: str, planned: dict[str, VisitKind], *done: AnalysedSession) -> str | None:
-    found = group_takes(done)
-    visit = next(v for v in found if v.takes[0].session.id == name)
-    earlier = find_before(found, visit, planned)
+    takes = group_takes(done)
+    visit = next(v for v in takes if v.takes[0].session.id == name)
+    earlier = find_before(takes, visit, planned)
     return None if earlier is None else earlier.takes[0].session.id
 
 
@@ -124,35 +126,40 @@ def test_of_a_list_the_newest_day_and_the_one_before_it_are_read() -> None:
 
 
 def test_speeds_of_a_list_are_of_the_newest_visit_with_its_change(stored: Clinic) -> None:
-    patient, other = feedback.person(stored), feedback.person(stored)
+    patient, other_patient = feedback.person(stored), feedback.person(stored)
     sessions = [feedback.walked(stored, patient, days, 12.0) for days in (0, 7)]
     feedback.walked(stored, patient, 9, 12.0, pace="fast")
     with stored.db.read() as c:
-        chosen = choose_newest_walks(c, [patient, other], {})
+        chosen = choose_newest_walks(c, [patient, other_patient], {})
         done = list_analysed(c, patient)
     assert list(chosen) == [patient]
     assert [w.id for w in chosen[patient]] == sessions[::-1]
-    shown = {a.session.id: a.found for a in done}
+    visible_by_id = {a.session.id: a.found for a in done}
     edits = {a.found.id: a.edits for a in done}
     reviewed = stored.app.state.reviewed
-    speed = read_newest_speeds(reviewed, chosen, shown, edits)[patient]
+    speed = read_newest_speeds(reviewed, chosen, visible_by_id, edits)[patient]
     assert speed.mean.mean == pytest.approx(1.2, abs=0.2)
     assert speed.change is not None
-    first = read_newest_speeds(reviewed, {patient: chosen[patient][:1]}, shown, edits)[patient]
+    first = read_newest_speeds(reviewed, {patient: chosen[patient][:1]}, visible_by_id, edits)[patient]
     assert first.change is None
     # of the newest day nothing can be read: there is no newest speed
-    gone = {**shown, sessions[1]: shown[sessions[0]].__class__(**{**vars(shown[sessions[1]]), "files": {}})}
+    gone = {
+        **visible_by_id,
+        sessions[1]: visible_by_id[sessions[0]].__class__(
+            **{**vars(visible_by_id[sessions[1]]), "files": {}}
+        ),
+    }
     assert read_newest_speeds(reviewed, chosen, gone, edits) == {}
 
 
 def test_figures_of_a_visit_are_means_over_its_takes(stored: Clinic) -> None:
     patient = feedback.person(stored)
-    both = [feedback.walked(stored, patient, 0, duration) for duration in (12.0, 24.0)]
+    pair = [feedback.walked(stored, patient, 0, duration) for duration in (12.0, 24.0)]
     with stored.db.read() as c:
         (visit,) = group_takes(list_analysed(c, patient))
-    found = measure_visit(stored.app.state.reviewed, visit)
-    cadence = found["cadence_spm", None]
-    assert list(cadence.by_take) == both
+    result = measure_visit(stored.app.state.reviewed, visit)
+    cadence = result["cadence_spm", None]
+    assert list(cadence.by_take) == pair
     single = [p.mean for p in cadence.takes]
     assert cadence.mean.mean == pytest.approx(sum(m or 0.0 for m in single) / 2, rel=0.01)
     assert cadence.mean.n == sum(p.n for p in cadence.takes)

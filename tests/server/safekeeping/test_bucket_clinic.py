@@ -32,14 +32,14 @@ from tests.helpers.buckets import Bucket, bucket, s3_server  # noqa: F401 - fixt
 
 @pytest.fixture
 def clinic(tmp_path: Path, bucket: Bucket) -> Iterator[Clinic]:  # noqa: F811
-    made = Clinic(tmp_path / "home", lease_s=5.0, database_url="", bucket=bucket.url)
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path / "home", lease_s=5.0, database_url="", bucket=bucket.url)
+    yield new_clinic
+    new_clinic.db.close()
 
 
 def findings(clinic: Clinic) -> list[str]:
-    found = checks.check(clinic.db, clinic.blobs, clinic.settings)
-    return [f"{f.area}: {f.message}" for f in found]
+    result = checks.check(clinic.db, clinic.blobs, clinic.settings)
+    return [f"{f.area}: {f.message}" for f in result]
 
 
 def at_once(clinic: Clinic) -> Settings:
@@ -57,7 +57,7 @@ def upload(clinic: Clinic, name: str, content: bytes) -> None:
 
 
 def environment(clinic: Clinic, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the command line of this clinic has."""
+    """Environment for commands of this clinic."""
     monkeypatch.setenv("SAGITTAL_BUCKET", clinic.settings.bucket)
     monkeypatch.setenv("SAGITTAL_HOME", str(clinic.folder))
 
@@ -75,11 +75,11 @@ def test_what_nothing_refers_to_goes_to_the_trash_and_comes_back(clinic: Clinic,
     bucket.write(key, b"of somebodi")
     assert "has changed" in findings(clinic)[0]
     bucket.write(key, b"of nobody")
-    [wanted] = [f for f in clinic.blobs.files() if f.space == clinic.patient.id]
-    address = (wanted.space, wanted.name)
-    [at] = {one.since for one in clinic.blobs.trash.files()}
-    clinic.blobs.trash.prepare([address], at)
-    clinic.blobs.trash.take([address], at)
+    [expected] = [f for f in clinic.blobs.files() if f.space == clinic.patient.id]
+    address = (expected.space, expected.name)
+    [position] = {one.since for one in clinic.blobs.trash.files()}
+    clinic.blobs.trash.prepare([address], position)
+    clinic.blobs.trash.take([address], position)
     assert "lies in the trash" in findings(clinic)[0]
     assert sweep.put_back(clinic.db, clinic.blobs) == 1
     assert findings(clinic) == []
@@ -90,9 +90,9 @@ def test_a_database_that_went_back_takes_no_file(clinic: Clinic, bucket: Bucket)
     with clinic.db.write() as c:
         c.execute(delete(recording_file))
     clinic.settings.mark.write_bytes(b"\0" * 40)
-    before = bucket.objects()
+    initial = bucket.objects()
     assert sweep_now(clinic) == 0
-    assert bucket.objects() == before
+    assert bucket.objects() == initial
 
 
 def test_an_erased_patient_leaves_no_object_not_even_in_the_trash(clinic: Clinic, bucket: Bucket) -> None:  # noqa: F811
@@ -135,8 +135,8 @@ def test_the_check_finds_damage_and_says_in_one_sentence_when_it_cannot_look(
     assert "has changed on the disk" in capsys.readouterr().out
     bucket.server.stop()
     assert main(["check"]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert [line for line in said if "cannot be reached" in line] == said[-1:]
+    message = capsys.readouterr().err.splitlines()
+    assert [line for line in message if "cannot be reached" in line] == message[-1:]
     bucket.server.start()
     monkeypatch.delenv("SAGITTAL_BUCKET")
     assert main(["check"]) == 2
@@ -151,19 +151,19 @@ def test_a_backup_has_the_bucket_and_goes_into_a_folder_and_into_an_empty_bucket
 ) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
-    made = backups.make_backup(clinic.db, clinic.settings, disk, None)
-    assert (made.files, made.missing) == (1, [])
-    there = bucket.url + "-again"
-    for name, url in (("folder", ""), ("bucket", there)):
+    backup = backups.make_backup(clinic.db, clinic.settings, disk, None)
+    assert (backup.files, backup.missing) == (1, [])
+    target = bucket.url + "-again"
+    for name, url in (("folder", ""), ("bucket", target)):
         home = replace(clinic.settings, data_dir=tmp_path / name, bucket=url)
-        assert restore(made.path, home, None).files == 1
+        assert restore(backup.path, home, None).files == 1
         with closing(Database(home.database)) as db:
             assert checks.check(db, open_blobs(home), home) == []
         assert not home.restoring.exists()
-    for taken in (bucket.url, there):
-        home = replace(clinic.settings, data_dir=tmp_path / "another", bucket=taken)
+    for selection in (bucket.url, target):
+        home = replace(clinic.settings, data_dir=tmp_path / "another", bucket=selection)
         with pytest.raises(RestoreError, match="is not empty"):
-            restore(made.path, home, None)
+            restore(backup.path, home, None)
         assert sorted(p.name for p in home.data_dir.iterdir()) == ["server.lock"]
     bucket.server.stop()
     with pytest.raises(backups.BackupError, match="cannot be read"):
@@ -187,7 +187,7 @@ def test_a_restore_into_a_bucket_that_was_cut_off_is_made_again(
 ) -> None:
     upload(clinic, "b.txt", b"more signals")
     (tmp_path / "disk").mkdir()
-    made = backups.make_backup(clinic.db, clinic.settings, tmp_path / "disk", None)
+    backup = backups.make_backup(clinic.db, clinic.settings, tmp_path / "disk", None)
     home = replace(clinic.settings, data_dir=tmp_path / "again", bucket=bucket.url + "-again")
     adopt = BucketBlobs.adopt
 
@@ -197,11 +197,11 @@ def test_a_restore_into_a_bucket_that_was_cut_off_is_made_again(
 
     monkeypatch.setattr(BucketBlobs, "adopt", adopt_one)
     with pytest.raises(RestoreError, match="Mend that and restore again"):
-        restore(made.path, home, None)
+        restore(backup.path, home, None)
     monkeypatch.setattr(BucketBlobs, "adopt", adopt)
     bucket.server.start()
     assert not home.database.exists()
-    assert restore(made.path, home, None).files == 2
+    assert restore(backup.path, home, None).files == 2
     with closing(Database(home.database)) as db:
         assert checks.check(db, open_blobs(home), home) == []
     assert not home.restoring.exists()
@@ -218,8 +218,8 @@ def test_a_move_into_the_bucket_goes_on_where_it_was_cut_off(
     upload(clinic, "b.txt", b"more signals")
     clinic.blobs.put(clinic.patient.id, b"of nobody")
     assert sweep_now(clinic) == 1
-    there = replace(clinic.settings, bucket=bucket.url)
-    clinic.settings = there
+    target = replace(clinic.settings, bucket=bucket.url)
+    clinic.settings = target
     environment(clinic, monkeypatch)
     assert main(["check"]) == 2
     assert "Run `sagittal move-blobs` first" in capsys.readouterr().err
@@ -238,13 +238,13 @@ def test_a_move_into_the_bucket_goes_on_where_it_was_cut_off(
     assert main(["move-blobs"]) == 0
     assert "read back" in capsys.readouterr().out
     assert len(bucket.objects()) == 3
-    left = [p for p in (*there.blobs.rglob("*"), *there.trash.rglob("*")) if p.is_file()]
+    left = [p for p in (*target.blobs.rglob("*"), *target.trash.rglob("*")) if p.is_file()]
     assert sorted(p.name for p in left) == ["bucket.txt", "list.txt"]
     assert main(["check"]) == 0
-    late = FolderBlobs(there.blobs).put(clinic.patient.id, b"of a worker that nobody had stopped")
+    late = FolderBlobs(target.blobs).put(clinic.patient.id, b"of a worker that nobody had stopped")
     assert main(["move-blobs"]) == 0
     assert "1 stored files" in capsys.readouterr().out
-    clinic.blobs = open_blobs(there)
+    clinic.blobs = open_blobs(target)
     assert clinic.blobs.has(clinic.patient.id, late.sha256)
     assert findings(clinic) == []
     clinic.db.close()

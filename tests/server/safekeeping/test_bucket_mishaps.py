@@ -38,9 +38,9 @@ from tests.helpers.service import line_with
 
 @pytest.fixture
 def clinic(tmp_path: Path, bucket: Bucket) -> Iterator[Clinic]:  # noqa: F811
-    made = Clinic(tmp_path / "home", lease_s=5.0, database_url="", bucket=bucket.url)
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path / "home", lease_s=5.0, database_url="", bucket=bucket.url)
+    yield new_clinic
+    new_clinic.db.close()
 
 
 @pytest.fixture
@@ -68,11 +68,11 @@ def start(*words: str, home: Path, url: str, **more: str) -> subprocess.Popen[st
 
 
 def refused(*words: str, home: Path, url: str, **more: str) -> str:
-    """What a command says that ends with 1."""
+    """Message of a command that exits with 1."""
     with start(*words, home=home, url=url, **more) as process:
-        _, said = process.communicate(timeout=120)
-    assert process.returncode == 1, said
-    return said
+        _, message = process.communicate(timeout=120)
+    assert process.returncode == 1, message
+    return message
 
 
 def is_whole(home: Settings) -> bool:
@@ -240,10 +240,10 @@ def test_a_start_that_is_refused_leaves_room_for_the_restore_that_it_asks_for(
         changed.setattr(fs, "system", Dying(20))
         with pytest.raises(PowerError):
             restore(archive, home, None)
-    before = {path.name for path in home.data_dir.iterdir()}
-    said = refused("serve", "--port", "0", home=home.data_dir, url=home.bucket)
-    assert "Run `sagittal restore` again" in said
-    assert {path.name for path in home.data_dir.iterdir()} == before
+    initial_names = {path.name for path in home.data_dir.iterdir()}
+    message = refused("serve", "--port", "0", home=home.data_dir, url=home.bucket)
+    assert "Run `sagittal restore` again" in message
+    assert {path.name for path in home.data_dir.iterdir()} == initial_names
     assert restore(archive, home, None).files == 1
     assert is_whole(home)
 
@@ -256,8 +256,8 @@ def test_a_restore_passes_over_what_a_start_makes_and_nothing_else(
     clinic: Clinic, archive: Path, tmp_path: Path, stranger: str
 ) -> None:
     home = replace(clinic.settings, data_dir=tmp_path / "again", bucket="")
-    made = ("nodes/a/server.lock", "nodes/key", "nodes/key.lock", "part-locks/aa.lock", "workers.lock")
-    for name in (*made, stranger):
+    result = ("nodes/a/server.lock", "nodes/key", "nodes/key.lock", "part-locks/aa.lock", "workers.lock")
+    for name in (*result, stranger):
         fs.make_folder((home.data_dir / name).parent)
         (home.data_dir / name).write_bytes(b"a")
     fs.make_folder(home.blobs / "incoming")
@@ -319,11 +319,11 @@ def test_who_is_erased_while_a_sweep_copies_leaves_no_copy(
     prepare = BucketTrash.prepare
     copied: list[str] = []
 
-    def prepare_late(self: BucketTrash, found: Collection[Address], at: Any) -> None:
+    def prepare_late(self: BucketTrash, result: Collection[Address], position: Any) -> None:
         """The copies are done after the erasure has looked into the trash."""
-        prepare(self, found, at)
+        prepare(self, result, position)
         erase(clinic)
-        copied.extend(f"trash/{name_stamp(at)}/{space}/{name}" for space, name in found)
+        copied.extend(f"trash/{name_stamp(position)}/{space}/{name}" for space, name in result)
         for key in copied:
             bucket.write(key, b"of nobody")
 
@@ -343,17 +343,17 @@ def test_a_copy_of_what_an_erased_session_had_goes_too(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stray = clinic.blobs.put(clinic.patient.id, b"of nobody")
-    kept = bucket.objects() - {f"blobs/{clinic.patient.id}/{stray.sha256}"}
+    retained = bucket.objects() - {f"blobs/{clinic.patient.id}/{stray.sha256}"}
     prepare = BucketTrash.prepare
 
-    def prepare_and_remove(self: BucketTrash, found: Collection[Address], at: Any) -> None:
-        prepare(self, found, at)
+    def prepare_and_remove(self: BucketTrash, result: Collection[Address], position: Any) -> None:
+        prepare(self, result, position)
         assert len(bucket.objects()) == 3
         references.discard(clinic.db, clinic.blobs, clinic.patient.id, [stray.sha256])
 
     monkeypatch.setattr(BucketTrash, "prepare", prepare_and_remove)
     assert sweep_now(clinic) == 0
-    assert bucket.objects() == kept
+    assert bucket.objects() == retained
 
 
 def test_of_two_sweeps_at_once_one_runs(clinic: Clinic) -> None:

@@ -1,4 +1,4 @@
-"""The process that makes one PDF: what it answers when it cannot."""
+"""PDF process: responses to failures."""
 
 from __future__ import annotations
 

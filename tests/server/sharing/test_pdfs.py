@@ -37,8 +37,8 @@ class Child:
         return msgspec.msgpack.encode(self.said)
 
 
-def answering(monkeypatch: pytest.MonkeyPatch, said: PaperReply | Exception) -> Child:
-    child = Child(said)
+def answering(monkeypatch: pytest.MonkeyPatch, message: PaperReply | Exception) -> Child:
+    child = Child(message)
     monkeypatch.setattr(pdfs, "run_errand", child.run)
     return child
 

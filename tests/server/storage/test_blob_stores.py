@@ -1,4 +1,4 @@
-"""What every store of blobs promises, held for the folder and for a bucket behind real HTTP."""
+"""Guarantees of every blob store, checked for the folder and for a bucket behind real HTTP."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ AT = dt.datetime(2026, 3, 14, 3, 15, tzinfo=dt.UTC)
 
 @dataclass
 class Store:
-    """A store, and how somebody without a right changes a file in it."""
+    """Blob store, with unauthorised modification of its files."""
 
     blobs: BlobStore
     damage: Callable[[str, str, bytes], None]
@@ -38,9 +38,9 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Store:
     if request.param == "folder":
         folder = FolderBlobs(tmp_path / "blobs")
         return Store(folder, lambda space, name, content: _overwrite(folder.path(space, name), content))
-    there: Bucket = request.getfixturevalue("bucket")
-    blobs = BucketBlobs(there.url, tmp_path / "blobs" / INCOMING)
-    return Store(blobs, lambda space, name, content: there.write(f"blobs/{space}/{name}", content))
+    target: Bucket = request.getfixturevalue("bucket")
+    blobs = BucketBlobs(target.url, tmp_path / "blobs" / INCOMING)
+    return Store(blobs, lambda space, name, content: target.write(f"blobs/{space}/{name}", content))
 
 
 def _overwrite(path: Path, content: bytes) -> None:
@@ -81,8 +81,8 @@ def test_a_damaged_or_missing_file_is_never_given_and_another_put_mends_it(store
     assert code_of(lambda: blobs.read_part(SPACE, NAME, 0, 3)) == "blob_missing"
     assert code_of(lambda: blobs.require(SPACE, NAME)) == "blob_missing"
     blobs.put(SPACE, CONTENT)
-    for other in (b"", b"seven sensorz", CONTENT + b"!"):
-        store.damage(SPACE, NAME, other)
+    for second in (b"", b"seven sensorz", CONTENT + b"!"):
+        store.damage(SPACE, NAME, second)
         assert code_of(lambda: blobs.read(SPACE, NAME)) == "blob_damaged"
         assert code_of(lambda: blobs.open(SPACE, NAME)) == "blob_damaged"
     store.damage(SPACE, NAME, CONTENT[:5])
@@ -132,12 +132,12 @@ def test_an_address_cannot_leave_the_store(store: Store) -> None:
 
 def test_a_file_is_old_until_somebody_writes_it_anew_and_then_gone(store: Store) -> None:
     store.blobs.put(SPACE, CONTENT)
-    [found] = store.blobs.files()
-    assert -2.0 < found.age_s < 60.0
-    assert store.blobs.is_older(found, -60.0)
-    assert not store.blobs.is_older(found, 60.0)
-    store.blobs.discard([found])
-    assert not store.blobs.is_older(found, -60.0)
+    [result] = store.blobs.files()
+    assert -2.0 < result.age_s < 60.0
+    assert store.blobs.is_older(result, -60.0)
+    assert not store.blobs.is_older(result, 60.0)
+    store.blobs.discard([result])
+    assert not store.blobs.is_older(result, -60.0)
     store.blobs.probe()
     assert addresses(store.blobs) == []
 
@@ -170,8 +170,8 @@ def test_the_trash_takes_keeps_gives_back_and_forgets(store: Store) -> None:
     discard(b"old")
     assert trash.expire(AT + KEPT) == 1
     assert [one.name for one in trash.files()] == [young]
-    others = discard(b"of the other", OTHER)
+    remaining = discard(b"of the other", OTHER)
     trash.remove(SPACE, [NAME])
-    assert {one.name for one in trash.files()} == {young, others}
+    assert {one.name for one in trash.files()} == {young, remaining}
     trash.remove(SPACE)
-    assert [one.name for one in trash.files()] == [others]
+    assert [one.name for one in trash.files()] == [remaining]

@@ -80,8 +80,8 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 @pytest.mark.parametrize("name", CALLS)
 @pytest.mark.usefixtures("bucket", "silent")
 def test_a_store_that_never_answers_is_away(tmp_path: Path, name: str) -> None:
-    there = BucketBlobs("s3://clinic", tmp_path / "incoming")
-    assert why_away(lambda: CALLS[name](there)).code == "store_away"
+    target = BucketBlobs("s3://clinic", tmp_path / "incoming")
+    assert why_away(lambda: CALLS[name](target)).code == "store_away"
 
 
 @pytest.mark.slow
@@ -150,8 +150,8 @@ def test_no_keys_at_all_refuse(
     for name in KEYS:
         monkeypatch.delenv(name)
     monkeypatch.setenv("AWS_METADATA_ENDPOINT", "http://127.0.0.1:1")  # nobody asks the network of a cloud
-    there = BucketBlobs(bucket.url, tmp_path / "incoming")
-    assert why_away(there.probe).refuses
+    target = BucketBlobs(bucket.url, tmp_path / "incoming")
+    assert why_away(target.probe).refuses
 
 
 def test_a_bucket_with_versions_is_warned_of(
@@ -215,15 +215,15 @@ def test_a_command_with_another_setting_than_the_files_is_refused(
     bucket: Bucket,  # noqa: F811
     tmp_path: Path,
 ) -> None:
-    here, there = Settings(data_dir=tmp_path), Settings(data_dir=tmp_path, bucket=bucket.url)
-    blob = open_blobs(here).put(SPACE, b"walk")
+    place, target = Settings(data_dir=tmp_path), Settings(data_dir=tmp_path, bucket=bucket.url)
+    blob = open_blobs(place).put(SPACE, b"walk")
     with pytest.raises(SettingsError, match="Run `sagittal move-blobs` first"):
-        open_blobs(there)
-    open_blobs(here).remove(SPACE, blob.sha256)
-    open_blobs(there).put(SPACE, b"walk")
-    for other in (here, Settings(data_dir=tmp_path, bucket="s3://another")):
+        open_blobs(target)
+    open_blobs(place).remove(SPACE, blob.sha256)
+    open_blobs(target).put(SPACE, b"walk")
+    for second in (place, Settings(data_dir=tmp_path, bucket="s3://another")):
         with pytest.raises(SettingsError, match=f"Set SAGITTAL_BUCKET={bucket.url}"):
-            open_blobs(other)
+            open_blobs(second)
 
 
 @pytest.mark.slow

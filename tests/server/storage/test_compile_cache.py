@@ -48,15 +48,15 @@ def test_a_second_process_compiles_nothing_again(tmp_path: Path) -> None:
         "from sagittal.core.fusion import attitude; attitude.compile_attitude_kernel();"
         "s = attitude.attitude_kernel.stats; print(len(s.cache_hits), len(s.cache_misses))"
     )
-    said = []
+    message = []
     for name in ("one", "two"):
         env = {**make_environment(Settings(data_dir=tmp_path / name)), "PYTHONPATH": str(ROOT)}
         done = subprocess.run(
             [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
         )
-        said.append(tuple(map(int, done.stdout.split())))
-    assert said[0] == (0, 1)
-    assert said[1] == (1, 0)
+        message.append(tuple(map(int, done.stdout.split())))
+    assert message[0] == (0, 1)
+    assert message[1] == (1, 0)
 
 
 def test_the_data_folder_is_used_where_the_cache_folder_cannot_be_written(tmp_path: Path) -> None:
@@ -81,8 +81,8 @@ def test_without_a_home_the_fallback_is_used(tmp_path: Path) -> None:
 
 def test_versions_that_nobody_uses_any_more_are_removed(tmp_path: Path) -> None:
     old, young = (tmp_path / "caches" / "sagittal" / f"filters-{n}" for n in ("old", "young"))
-    for other in (old, young):
-        (other / "body_1").mkdir(parents=True)
+    for alternative in (old, young):
+        (alternative / "body_1").mkdir(parents=True)
     long_ago = time.time() - KEEP_S - 60
     os.utime(old, (long_ago, long_ago))
     find_compile_cache(os.environ, tmp_path)
@@ -112,11 +112,11 @@ def test_the_version_changes_with_every_source_a_filter_is_made_of(tmp_path: Pat
     sources = {"events/kernel.py": FILTER, "frames.py": "G = 9.81\n", "angles.py": "", "report.py": ""}
     for name, text in sources.items():
         (tmp_path / name).write_text(text)
-    before = fingerprint_filters(tmp_path)
+    initial = fingerprint_filters(tmp_path)
     (tmp_path / "report.py").write_text("no filter uses it")
-    assert fingerprint_filters(tmp_path) == before
-    seen = {before}
+    assert fingerprint_filters(tmp_path) == initial
+    observations = {initial}
     for name in ("events/kernel.py", "frames.py", "angles.py"):
         (tmp_path / name).write_text(sources[name] + "# changed\n")
-        seen.add(fingerprint_filters(tmp_path))
-    assert len(seen) == 4
+        observations.add(fingerprint_filters(tmp_path))
+    assert len(observations) == 4

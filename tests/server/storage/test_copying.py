@@ -59,7 +59,7 @@ def test_every_row_comes_over_and_numbers_go_on_behind_the_highest_ever_given(
             assert audit.find_problems(c) == []
             assert highest_number(c, "job") == 40
     assert rows[0] == rows[1]
-    assert [len(found) for found in rows[0]] == [2, 3, 1]
+    assert [len(result) for result in rows[0]] == [2, 3, 1]
     with target.read() as c:  # no value is NULL, not the word null
         assert c.exec_driver_sql("SELECT manifest IS NULL FROM recording").scalars().all() == [1]
 

@@ -75,10 +75,10 @@ def test_a_limit_is_kept_while_receiving_and_nothing_is_left(tmp_path: Path) -> 
 
 def test_equal_bytes_of_two_spaces_are_two_files(tmp_path: Path) -> None:
     store = FolderBlobs(tmp_path)
-    other = "b" * 32
-    assert store.put(SPACE, CONTENT) == store.put(other, CONTENT)
+    second = "b" * 32
+    assert store.put(SPACE, CONTENT) == store.put(second, CONTENT)
     store.erase(SPACE)
-    assert [s.space for s in store.files()] == [other]
+    assert [s.space for s in store.files()] == [second]
 
 
 def test_an_address_cannot_leave_the_store(tmp_path: Path) -> None:

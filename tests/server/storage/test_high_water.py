@@ -1,4 +1,4 @@
-"""The mark beside the database: it follows the log, and knows a database that has gone back."""
+"""The mark next to the database follows the audit log and detects an older database."""
 
 from __future__ import annotations
 
@@ -179,16 +179,16 @@ def test_a_power_cut_leaves_the_old_mark_or_the_new_one(
     path = tmp_path / "audit.mark"
     write_rows(db, 1)
     raise_mark(db, path)
-    before = path.read_bytes()
+    initial_content = path.read_bytes()
     write_rows(db, 1)
     disk = ModelDisk()
-    disk.put(path, before)
+    disk.put(path, initial_content)
     monkeypatch.setattr(fs, "system", disk)
     raise_mark(db, path)
-    seen = {state[path] for states in disk.history for state in states}
-    assert len(seen) == 2
-    assert before in seen
-    assert {state[path] for state in disk.history[-1]} == seen - {before}
+    observations = {state[path] for states in disk.history for state in states}
+    assert len(observations) == 2
+    assert initial_content in observations
+    assert {state[path] for state in disk.history[-1]} == observations - {initial_content}
 
 
 def test_the_mark_is_a_number_and_a_hash(db: Database, mark: Path) -> None:

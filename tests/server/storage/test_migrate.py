@@ -121,9 +121,9 @@ def counts(source: Source) -> tuple[int, int]:
 def head(scripts: Path) -> str:
     """The newest revision of this version; the tests' own step follows it."""
     config = migrate.configuration(Path("none.db"), scripts)
-    found = ScriptDirectory.from_config(config).get_current_head()
-    assert found is not None
-    return found
+    current_head = ScriptDirectory.from_config(config).get_current_head()
+    assert current_head is not None
+    return current_head
 
 
 @pytest.fixture
@@ -151,29 +151,29 @@ def test_the_migrated_schema_is_the_one_the_code_declares(bare_source: Source) -
 @pytest.mark.slow
 def test_down_and_up_again_leave_the_same_schema(bare_source: Source) -> None:
     migrate.upgrade(bare_source)
-    before = schema(bare_source)
+    initial_schema = schema(bare_source)
     command.downgrade(migrate.configuration(bare_source), "base")
     assert schema(bare_source) == set()
     migrate.upgrade(bare_source)
-    assert schema(bare_source) == before
+    assert schema(bare_source) == initial_schema
 
 
 @pytest.mark.slow
 def test_data_survive_up_and_down_and_a_backup_is_made_before(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    source, kept = bare_source, tmp_path / "kept"
-    assert migrate.upgrade(source, target=head, scripts=scripts, backups=kept) is None
+    source, retained = bare_source, tmp_path / "kept"
+    assert migrate.upgrade(source, target=head, scripts=scripts, backups=retained) is None
     fill(source)
     (scripts / "versions" / "next.py").write_text(HANG.format(head=head, then="pass"))
-    backup = migrate.upgrade(source, scripts=scripts, backups=kept)
+    backup = migrate.upgrade(source, scripts=scripts, backups=retained)
     assert migrate.read_revision(source) == "next"
     assert counts(source) == (1, 2)
     assert backup is not None
     assert (counts(backup), migrate.read_revision(backup)) == ((1, 2), head)
     command.downgrade(migrate.configuration(source, scripts), head)
     assert counts(source) == (1, 2)
-    assert migrate.upgrade(source, scripts=scripts, backups=kept) is not None
+    assert migrate.upgrade(source, scripts=scripts, backups=retained) is not None
     assert counts(source) == (1, 2)
 
 
@@ -204,10 +204,10 @@ def test_earlier_sessions_have_no_condition_but_the_feedback_that_was_kept(
 def test_a_failing_migration_leaves_exactly_the_old_revision(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    source, kept = bare_source, tmp_path / "kept"
+    source, retained = bare_source, tmp_path / "kept"
     migrate.upgrade(source, target=head, scripts=scripts)
     fill(source)
-    before = schema(source)
+    initial_schema = schema(source)
     step = scripts / "versions" / "next.py"
     for wrong in (
         "raise RuntimeError('broken')",
@@ -215,10 +215,14 @@ def test_a_failing_migration_leaves_exactly_the_old_revision(
     ):
         step.write_text(HANG.format(head=head, then=wrong))
         with pytest.raises((RuntimeError, IntegrityError)):
-            migrate.upgrade(source, scripts=scripts, backups=kept)
-        assert (schema(source), migrate.read_revision(source), counts(source)) == (before, head, (1, 2))
+            migrate.upgrade(source, scripts=scripts, backups=retained)
+        assert (schema(source), migrate.read_revision(source), counts(source)) == (
+            initial_schema,
+            head,
+            (1, 2),
+        )
     step.write_text(HANG.format(head=head, then="pass"))
-    migrate.upgrade(source, scripts=scripts, backups=kept)
+    migrate.upgrade(source, scripts=scripts, backups=retained)
     assert migrate.read_revision(source) == "next"
 
 
@@ -226,16 +230,16 @@ def test_a_failing_migration_leaves_exactly_the_old_revision(
 def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
     bare_source: Source, tmp_path: Path, scripts: Path, head: str
 ) -> None:
-    source, kept, marker = bare_source, tmp_path / "kept", tmp_path / "reached"
+    source, retained, marker = bare_source, tmp_path / "kept", tmp_path / "reached"
     migrate.upgrade(source, target=head, scripts=scripts)
     fill(source)
-    before = schema(source)
+    initial_schema = schema(source)
     step = scripts / "versions" / "next.py"
     step.write_text(HANG.format(head=head, then=f"pathlib.Path({str(marker)!r}).touch(); time.sleep(600)"))
     script = textwrap.dedent(f"""
         from pathlib import PosixPath
         from sagittal.server.storage.migrate import upgrade
-        upgrade({source!r}, scripts={scripts!r}, backups={kept!r})
+        upgrade({source!r}, scripts={scripts!r}, backups={retained!r})
     """)
     process = subprocess.Popen([sys.executable, "-c", script], cwd=ROOT)
     limit = time.monotonic() + 60
@@ -245,9 +249,9 @@ def test_a_migration_killed_in_the_middle_leaves_exactly_the_old_revision(
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    assert (schema(source), migrate.read_revision(source), counts(source)) == (before, head, (1, 2))
+    assert (schema(source), migrate.read_revision(source), counts(source)) == (initial_schema, head, (1, 2))
     step.write_text(HANG.format(head=head, then="pass"))
-    migrate.upgrade(source, scripts=scripts, backups=kept)
+    migrate.upgrade(source, scripts=scripts, backups=retained)
     assert (migrate.read_revision(source), counts(source)) == ("next", (1, 2))
 
 
@@ -273,8 +277,8 @@ def test_a_server_whose_port_is_in_use_migrates_nothing(
 ) -> None:
     monkeypatch.setattr("os.umask", lambda _: 0)
     migrate.upgrade(tmp_path / "sagittal.db", target="0020")
-    with socket.create_server(("127.0.0.1", 0)) as other:
-        settings = Settings(data_dir=tmp_path, port=other.getsockname()[1])
+    with socket.create_server(("127.0.0.1", 0)) as other_server:
+        settings = Settings(data_dir=tmp_path, port=other_server.getsockname()[1])
         assert serve.run(settings, pytest.fail) == 1
     assert "choose another with --port" in capsys.readouterr().err
     assert migrate.read_revision(tmp_path / "sagittal.db") == "0020"
@@ -335,10 +339,10 @@ def test_the_command_waits_quietly_and_ends_when_told(tmp_path: Path) -> None:
 
 
 def test_a_worker_refuses_a_database_that_is_behind(tmp_path: Path) -> None:
-    behind = tmp_path / "behind.db"
-    behind.touch()
+    details = tmp_path / "behind.db"
+    details.touch()
     with pytest.raises(migrate.MigrationError, match="sagittal migrate"):
-        migrate.require_current(behind)
+        migrate.require_current(details)
 
 
 def test_a_worker_makes_no_database(bare_source: Source) -> None:

@@ -17,7 +17,7 @@ from sagittal.server.storage.migration_steps import forbid_changes, is_sqlite, r
 
 @contextmanager
 def written_for(dialect: str) -> Iterator[io.StringIO]:
-    """What a migration would send to an engine."""
+    """SQL that a migration would send to an engine."""
     sent = io.StringIO()
     context = MigrationContext.configure(dialect_name=dialect, opts={"as_sql": True, "output_buffer": sent})
     with Operations.context(context):

@@ -1,4 +1,4 @@
-"""What is said when PostgreSQL cannot be used, copies between the engines, and who is alone on it."""
+"""Unavailable PostgreSQL, copies between engines, and exclusive access."""
 
 from __future__ import annotations
 
@@ -42,14 +42,17 @@ def test_every_reason_why_it_cannot_be_used_is_a_sentence(
     postgres: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     server, _, _ = postgres.rpartition("/")
-    known = PASSWORD.replace(" ", "%20")
-    for url, said in (
-        (postgres.replace(known, "SECRET"), r"refused postgresql://sagittal:\*\*\*@.*Check user, password"),
-        (postgres.replace(f":{known}", ""), "refused .*Check user, password"),
+    known_variant = PASSWORD.replace(" ", "%20")
+    for url, message in (
+        (
+            postgres.replace(known_variant, "SECRET"),
+            r"refused postgresql://sagittal:\*\*\*@.*Check user, password",
+        ),
+        (postgres.replace(f":{known_variant}", ""), "refused .*Check user, password"),
         (f"{server}/nowhere", "refused .*nowhere.* does not exist"),
-        (f"postgresql://a:{known}@127.0.0.1:1/b", "is not reached at .*Check that it runs"),
+        (f"postgresql://a:{known_variant}@127.0.0.1:1/b", "is not reached at .*Check that it runs"),
     ):
-        with pytest.raises(migrate.MigrationError, match=said) as refused:
+        with pytest.raises(migrate.MigrationError, match=message) as refused:
             migrate.upgrade(url)
         assert "SECRET" not in str(refused.value)
         assert PASSWORD not in str(refused.value)
@@ -84,7 +87,7 @@ def test_two_programs_that_migrate_at_once_do_it_once() -> None:
                 failed.append(error)
 
         # Alembic's own context is one per process, so the other program is what holds the lock first
-        with closing(Database(url)) as other, other.write():
+        with closing(Database(url)) as other_connection, other_connection.write():
             thread = threading.Thread(target=upgrade)
             thread.start()
             until = time.monotonic() + 30
@@ -162,9 +165,9 @@ def test_a_web_server_that_is_refused_migrates_nothing(tmp_path: Path) -> None:
         # no clock agrees so well
         node = replace(describe(tmp_path, url, "a", find_ports(1)[0]), lease_s=1e-9)
         process = start_process(node)
-        said = process.communicate(timeout=60)[1]
+        communicate = process.communicate(timeout=60)[1]
         assert process.returncode == 1
-        assert "Set both by NTP" in said
+        assert "Set both by NTP" in communicate
         assert migrate.read_revision(url) == "0020"
 
 
@@ -245,10 +248,10 @@ async def test_what_only_postgres_refuses_is_a_problem_of_the_request(tmp_path: 
 
 def test_a_frozen_writer_is_forgotten(postgres: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sagittal.server.storage.postgres.FORGOTTEN_S", 1)
-    with closing(Database(postgres)) as frozen, closing(Database(postgres)) as other:
+    with closing(Database(postgres)) as frozen, closing(Database(postgres)) as other_connection:
 
         def hold() -> None:
-            with frozen.write(), other.write() as c:
+            with frozen.write(), other_connection.write() as c:
                 assert c.closed is False
 
         # whoever was forgotten cannot commit any more
@@ -260,27 +263,31 @@ def test_only_one_web_server_is_on_a_database(postgres: str) -> None:
     with closing(Database(postgres)) as one, closing(Database(postgres)) as two:
         with one.serve("") as first, two.serve("") as second, two.serve("b") as named:
             assert (first, second, named) == (True, False, False)
-        with two.serve("") as again:
-            assert again
+        with two.serve("") as repeat:
+            assert repeat
 
 
 def test_web_servers_of_different_names_share_a_database_and_a_duty_is_done_by_one(postgres: str) -> None:
     with closing(Database(postgres)) as one, closing(Database(postgres)) as two:
-        with one.serve("a") as a, two.serve("b") as b, two.serve("a") as same, two.serve("") as alone:
-            assert (a, b, same, alone) == (True, True, False, False)
-        with one.do_alone("mark") as first, two.do_alone("mark") as second, two.do_alone("sweep") as other:
-            assert (first, second, other) == (True, False, True)
-        with two.do_alone("mark") as again:
-            assert again
+        with one.serve("a") as a, two.serve("b") as b, two.serve("a") as same, two.serve("") as single:
+            assert (a, b, same, single) == (True, True, False, False)
+        with (
+            one.do_alone("mark") as first,
+            two.do_alone("mark") as second,
+            two.do_alone("sweep") as alternative,
+        ):
+            assert (first, second, alternative) == (True, False, True)
+        with two.do_alone("mark") as repeat:
+            assert repeat
 
 
 def test_a_worker_elsewhere_needs_the_servers_folder_and_its_time(
     tmp_path: Path, postgres: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
-    here.mkdir()
+    place, elsewhere = tmp_path / "shared", tmp_path / "elsewhere"
+    place.mkdir()
     elsewhere.mkdir()
-    settings = Settings(data_dir=here, database_url=postgres)
+    settings = Settings(data_dir=place, database_url=postgres)
     with closing(Database(postgres)) as db:
         stop = threading.Event()
         threading.Timer(0.5, stop.set).start()
@@ -317,8 +324,8 @@ def test_what_was_erased_is_in_no_table_of_the_disk_and_who_reads_only_delays_it
         assert found()
         with db.read() as c:
             c.execute(select(patient)).all()
-            with db.write() as other:
-                other.execute(patient.delete())
+            with db.write() as alternative:
+                alternative.execute(patient.delete())
             assert not db.fold()
         assert db.fold()
         assert not found()

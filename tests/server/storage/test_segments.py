@@ -20,18 +20,18 @@ WHOLE = HEAD + b"".join(PIECES)
 
 
 def ends() -> list[int]:
-    found = [len(HEAD)]
+    result = [len(HEAD)]
     for piece in PIECES:
-        found.append(found[-1] + len(piece))
-    return found
+        result.append(result[-1] + len(piece))
+    return result
 
 
 def recovered(path: Path) -> tuple[segments.TakeLog | None, list[LogRecord]]:
-    seen: list[LogRecord] = []
-    log = segments.recover(path, seen.append)
+    observations: list[LogRecord] = []
+    log = segments.recover(path, observations.append)
     if log is not None:
         log.close()
-    return log, seen
+    return log, observations
 
 
 def test_a_log_is_read_as_it_was_written(tmp_path: Path) -> None:
@@ -52,24 +52,24 @@ def test_a_log_cut_at_any_byte_recovers_its_longest_valid_prefix(tmp_path: Path)
     whole_at = ends()
     for cut in range(len(WHOLE) + 1):
         path.write_bytes(WHOLE[:cut])
-        log, seen = recovered(path)
-        kept = max((e for e in whole_at if e <= cut), default=None)
-        if kept is None:
-            assert (log, seen, path.read_bytes()) == (None, [], WHOLE[:cut])
+        log, observations = recovered(path)
+        stored_largest = max((e for e in whole_at if e <= cut), default=None)
+        if stored_largest is None:
+            assert (log, observations, path.read_bytes()) == (None, [], WHOLE[:cut])
         else:
             assert log is not None
-            assert (log.size, path.read_bytes()) == (kept, WHOLE[:kept])
-            assert len(seen) == whole_at.index(kept) + 1
+            assert (log.size, path.read_bytes()) == (stored_largest, WHOLE[:stored_largest])
+            assert len(observations) == whole_at.index(stored_largest) + 1
 
 
 @pytest.mark.sweep
 def test_a_log_with_any_byte_changed_recovers_what_is_before_it(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     whole_at = ends()
-    for at in range(len(HEAD), len(WHOLE)):
-        path.write_bytes(WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :])
+    for index in range(len(HEAD), len(WHOLE)):
+        path.write_bytes(WHOLE[:index] + bytes([WHOLE[index] ^ 0x10]) + WHOLE[index + 1 :])
         recovered(path)
-        assert path.read_bytes() == WHOLE[: max(e for e in whole_at if e <= at)]
+        assert path.read_bytes() == WHOLE[: max(e for e in whole_at if e <= index)]
 
 
 def test_zeros_behind_the_last_record_are_cut_off(tmp_path: Path) -> None:
@@ -201,23 +201,23 @@ def test_an_end_torn_by_a_crash_is_no_damage_and_leaves_no_copy(tmp_path: Path) 
 def test_one_flipped_bit_in_a_log_keeps_the_whole_original(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
     last = ends()[-3]  # of the last batch only a changed content can be told from a torn end
-    for at in range(len(HEAD), last):
-        for kept in tmp_path.glob("*.damaged"):
-            kept.unlink()
-        hurt = WHOLE[:at] + bytes([WHOLE[at] ^ 0x10]) + WHOLE[at + 1 :]
-        found = damage_of(path, hurt)
-        start = max(e for e in ends() if e <= at)
-        assert found is not None
-        assert (found.start, found.lost) == (start, len(WHOLE) - start)
-        assert found.original == tmp_path / "t.1.damaged"
-        assert found.original.read_bytes() == hurt
+    for index in range(len(HEAD), last):
+        for stored_path in tmp_path.glob("*.damaged"):
+            stored_path.unlink()
+        hurt = WHOLE[:index] + bytes([WHOLE[index] ^ 0x10]) + WHOLE[index + 1 :]
+        damage = damage_of(path, hurt)
+        start = max(e for e in ends() if e <= index)
+        assert damage is not None
+        assert (damage.start, damage.lost) == (start, len(WHOLE) - start)
+        assert damage.original == tmp_path / "t.1.damaged"
+        assert damage.original.read_bytes() == hurt
         assert path.read_bytes() == WHOLE[:start]
 
 
 def test_a_second_damage_does_not_overwrite_the_first_original(tmp_path: Path) -> None:
     path = tmp_path / "t.log"
-    for at in (len(HEAD) + 60, len(HEAD) + 70):
-        damage_of(path, WHOLE[:at] + b"?" + WHOLE[at + 1 :])
+    for index in (len(HEAD) + 60, len(HEAD) + 70):
+        damage_of(path, WHOLE[:index] + b"?" + WHOLE[index + 1 :])
     assert sorted(p.name for p in tmp_path.glob("*.damaged")) == ["t.1.damaged", "t.2.damaged"]
 
 
@@ -246,8 +246,8 @@ def test_damage_is_looked_for_in_a_long_log_without_reading_it_into_memory(tmp_p
             file.write(b"BSGL1 " * 500_000)
         file.write(PIECES[1])
     tracemalloc.start()
-    found = segments.find_damage(path, len(HEAD))
+    damage = segments.find_damage(path, len(HEAD))
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert found is not None
+    assert damage is not None
     assert most < 20e6

@@ -1,4 +1,4 @@
-"""Tables that nobody has described: guessed by shape, checked, described once, and known again."""
+"""Undescribed tables: guess by shape, check, description, reuse."""
 
 from __future__ import annotations
 
@@ -71,21 +71,21 @@ def test_what_is_described_once_is_known_of_the_next_table_of_its_shape_that_fit
     assert problems(stored, session, "one.csv", source) == 0
     assert problems(stored, session, "one.csv", source | {"acc_unit": "m/s2", "gyr_unit": "rad/s"}) == 2
     with stored.db.write() as c:
-        made = tables.map_tables(c, None, session, ["one.csv"], source)
-    assert made.manifest is not None
-    assert [s["file"] for s in made.manifest["sources"]] == ["one.csv"]
-    said, guessed = sorted(listed(stored, session), key=lambda s: s.files)
-    assert (said.files, said.basis, said.source["rate_hz"]) == (("one.csv",), "said", 100)
+        result = tables.map_tables(c, None, session, ["one.csv"], source)
+    assert result.manifest is not None
+    assert [s["file"] for s in result.manifest["sources"]] == ["one.csv"]
+    items, guessed = sorted(listed(stored, session), key=lambda s: s.files)
+    assert (items.files, items.basis, items.source["rate_hz"]) == (("one.csv",), "said", 100)
     assert (guessed.files, guessed.basis) == (("two.csv",), "guessed")
 
-    again = uploaded(stored, {"three.csv": table(header)})
+    second = uploaded(stored, {"three.csv": table(header)})
     lifted = uploaded(stored, {"four.csv": table(header, lift=3.0)})
     with stored.db.read() as c:
-        (known,) = tables.find_known(c, stored.app.state.blobs, again)
+        (reference,) = tables.find_known(c, stored.app.state.blobs, second)
         assert tables.find_known(c, stored.app.state.blobs, lifted) == ()
         assert [s.basis for s in tables.list_tables(c, stored.app.state.blobs, lifted)] == ["known"]
-    assert (known.files, known.basis, known.source["rate_hz"]) == (("three.csv",), "known", 100)
-    assert list(known.source["columns"]) == ["*"]
+    assert (reference.files, reference.basis, reference.source["rate_hz"]) == (("three.csv",), "known", 100)
+    assert list(reference.source["columns"]) == ["*"]
 
 
 def test_a_table_described_anew_has_one_entry(stored: Clinic) -> None:
@@ -94,9 +94,9 @@ def test_a_table_described_anew_has_one_entry(stored: Clinic) -> None:
     for unit in ("g", "m/s2"):
         with stored.db.write() as c:
             source = {"columns": columns, "rate_hz": 100, "acc_unit": unit, "gyr_unit": "deg/s"}
-            made = tables.map_tables(c, None, session, ["one.csv"], source)
-    assert made.manifest is not None
-    assert [s["acc_unit"] for s in made.manifest["sources"]] == ["m/s2"]
+            result = tables.map_tables(c, None, session, ["one.csv"], source)
+    assert result.manifest is not None
+    assert [s["acc_unit"] for s in result.manifest["sources"]] == ["m/s2"]
 
 
 def test_a_file_that_is_not_there_and_an_entry_that_is_none_are_refused(stored: Clinic) -> None:

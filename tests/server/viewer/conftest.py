@@ -64,7 +64,7 @@ async def ward(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> 
 
 @pytest.fixture(scope="module")
 def loop() -> Iterator[asyncio.AbstractEventLoop]:
-    """An event loop in a thread of its own: playwright's synchronous interface owns this one."""
+    """Event loop in a separate thread, since playwright's synchronous interface occupies this one."""
     running = asyncio.new_event_loop()
     thread = threading.Thread(target=running.run_forever, daemon=True)
     thread.start()

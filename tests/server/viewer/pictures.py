@@ -1,4 +1,4 @@
-"""What the estimator says of the small kinematic walk, encoded as it encodes it."""
+"""Estimator messages of the small kinematic walk, encoded like the estimator does."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ ANGLES = walk.angles(12.0, RATE_HZ)
 
 def frame(i: int, **changed: Any) -> LiveFrame:
     """The i-th frame."""
-    made = LiveFrame(
+    result = LiveFrame(
         t_s=float(POSES.t_s[i]),
         seq=i,
         stage="running",
@@ -33,15 +33,15 @@ def frame(i: int, **changed: Any) -> LiveFrame:
         contact={s: bool(POSES.contact[FOOT[s]][i]) for s in SIDES},
         angles={name: float(x[i]) for name, x in ANGLES.angles.items()},
     )
-    return replace(made, **changed)
+    return replace(result, **changed)
 
 
 def picture(i: int, take: str = "take", delay_s: float | None = 0.02, **changed: Any) -> Picture:
     """The i-th picture."""
-    shown = frame(i, **changed)
-    phase = {s: 100.0 * ((shown.t_s / walk.STRIDE_S + walk.PHASE[s]) % 1.0) for s in SIDES}
-    body = wire.frame(shown, (), {}, dict(phase))
-    return Picture(take, shown.t_s, shown.seq, shown.stage, body, delay_s, 0, wire.pose(shown))
+    view = frame(i, **changed)
+    phase = {s: 100.0 * ((view.t_s / walk.STRIDE_S + walk.PHASE[s]) % 1.0) for s in SIDES}
+    body = wire.frame(view, (), {}, dict(phase))
+    return Picture(take, view.t_s, view.seq, view.stage, body, delay_s, 0, wire.pose(view))
 
 
 @dataclass(frozen=True)
@@ -54,13 +54,13 @@ class Leg:
     def curves(self) -> dict[str, np.ndarray]:
         """Variable → (101,) rad."""
         phase = np.linspace(0.0, 1.0, 101)
-        found = {"hip_flexion": walk.HIP, "knee_flexion": walk.KNEE, "ankle_dorsiflexion": walk.ANKLE}
-        return {name: self.scale * curve(phase) for name, curve in found.items()}
+        result = {"hip_flexion": walk.HIP, "knee_flexion": walk.KNEE, "ankle_dorsiflexion": walk.ANKLE}
+        return {name: self.scale * curve(phase) for name, curve in result.items()}
 
 
 def stride(n: int, leg: Leg, *, counted: bool = True, speed_mps: float | None = 1.2) -> bytes:
-    """What browsers are told of a stride."""
-    told = LiveStride(
+    """Stride message for browsers."""
+    notices = LiveStride(
         n=n,
         side=leg.side,
         start_s=float(n),
@@ -75,7 +75,7 @@ def stride(n: int, leg: Leg, *, counted: bool = True, speed_mps: float | None = 
         counted=counted,
         complete=True,
     )
-    return encode_json(wire.stride(told))
+    return encode_json(wire.stride(notices))
 
 
 def suffixed(zero: dict[str, float], side: Side) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""What a real browser shows of a figure."""
+"""Rendered content of a 3D view in a real browser."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ def until(frame: Any, enough: Callable[[dict[Side, int]], bool], dark: bool = Fa
     """Pictures of an element until the pixels of both leg colours are as wanted, or fail."""
     counts: dict[Side, int] = {}
     for _ in range(60):
-        seen = shot(frame)
-        counts = {side: int(pixels_of(seen, TINTS[dark][side]).sum()) for side in SIDES}
+        observations = shot(frame)
+        counts = {side: int(pixels_of(observations, TINTS[dark][side]).sum()) for side in SIDES}
         if enough(counts):
-            return seen
+            return observations
     raise AssertionError(f"leg colours were not drawn as wanted: {counts}")
 
 

@@ -40,7 +40,7 @@ def listening_ports() -> set[int]:
 
 
 async def gained_at(port: int) -> list[object]:
-    """What a process of this machine, or a page in its browser, gets there without a cookie."""
+    """Response to a local process or page without a cookie."""
     gained: list[object] = []
     async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", trust_env=False) as client:
         with contextlib.suppress(httpx.HTTPError):

@@ -1,4 +1,4 @@
-"""The drawing that stands in a page until the 3D figure is there."""
+"""Drawing shown until the 3D view is ready."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def outlines(svg: str, css: str) -> np.ndarray:
 def see(motion: ReplayMotion, point: np.ndarray, frame: int) -> np.ndarray:
     """A point of the room, m, as the camera of the 3D view shows it: three.js's matrices, written out."""
     shot = frame_person(motion.size, motion.facing)
-    eye, at = np.array(shot.eye), np.array(shot.at)
-    back = (eye - at) / np.linalg.norm(eye - at)
+    eye, values = np.array(shot.eye), np.array(shot.at)
+    back = (eye - values) / np.linalg.norm(eye - values)
     side = np.cross([0.0, 0.0, 1.0], back)
     side /= np.linalg.norm(side)
     view = np.stack((side, np.cross(back, side), back))

@@ -1,4 +1,4 @@
-"""A visit laid over another: same phase of a stride, same place and direction, nothing outside strides."""
+"""Overlay of another visit: same stride phase, position and direction, only within strides."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ OTHER = prepare_motion(turned(walk.poses(8.0)))
 
 @pytest.fixture(scope="module")
 def ghost(motion: ReplayMotion) -> GhostMotion:
-    made = match_ghost(motion, walk.strides(), OTHER, walk.strides(8.0))
-    assert made is not None
-    return made
+    result = match_ghost(motion, walk.strides(), OTHER, walk.strides(8.0))
+    assert result is not None
+    return result
 
 
 def counted(duration_s: float, side: Side = "left") -> list[tuple[float, float]]:
@@ -59,8 +59,8 @@ def test_both_are_at_the_same_phase_in_every_stride_that_counts(
         a, b = theirs[k % len(theirs)]
         for i in np.flatnonzero((motion.t_s >= start) & (motion.t_s < end)):
             phase = (motion.t_s[i] - start) / (end - start)
-            shown = (OTHER.t_s[ghost.frames[i]] - a) / (b - a)
-            assert abs(phase - shown) <= 0.011 / (b - a)
+            view = (OTHER.t_s[ghost.frames[i]] - a) / (b - a)
+            assert abs(phase - view) <= 0.011 / (b - a)
             seen += 1
     assert seen > 300
 
@@ -138,10 +138,12 @@ def test_the_norm_over_a_replay_has_its_angles_at_the_phases_of_both_legs(motion
             row = round(PHASES * (motion.t_s[i] - start) / (end - start))
             knee = -cardan_zxy(rotation.multiply(rotation.conjugate(thighs[i, 0]), shanks[i, 0]))[0]
             assert knee == pytest.approx(norm["knee_flexion"][row], abs=1e-4)
-    seen = ghost.frames >= 0
-    assert len(np.unique(ghost.frames[seen])) < 0.5 * seen.sum()  # a pair of phases is posed once
+    observations = ghost.frames >= 0
+    assert (
+        len(np.unique(ghost.frames[observations])) < 0.5 * observations.sum()
+    )  # a pair of phases is posed once
     pelvis = ghost.batches["pelvis"].position[:, 0, :2]
-    np.testing.assert_allclose(pelvis[seen], motion.root[seen], atol=1e-4)
+    np.testing.assert_allclose(pelvis[observations], motion.root[observations], atol=1e-4)
     assert (
         match_reference(motion, replace(walk.strides(), strides=()), ReferenceWalk(norm, walk.BODY)) is None
     )
@@ -152,6 +154,6 @@ def test_every_side_can_carry_the_match() -> None:
         walk.strides(), strides=tuple(s for s in walk.strides().strides if s.side == SIDES[1])
     )
     motion = prepare_motion(walk.poses())
-    made = match_ghost(motion, only_right, motion, walk.strides())
-    assert made is not None
-    assert (made.frames >= 0).any()
+    result = match_ghost(motion, only_right, motion, walk.strides())
+    assert result is not None
+    assert (result.frames >= 0).any()

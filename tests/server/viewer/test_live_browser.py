@@ -27,7 +27,7 @@ STAYS_PX = 1000
 
 
 class Walking:
-    """Gives pictures of the walk to a session until told to stop, as many as a software renderer can draw."""
+    """Feed frames of the walk to a session until stopped, at the pace of a software renderer."""
 
     def __init__(self, ward: Ward, loop: asyncio.AbstractEventLoop) -> None:
         self._stop = threading.Event()
@@ -68,12 +68,12 @@ def test_both_legs_move_while_pictures_come_and_lose_their_colours_when_they_sto
         walking = Walking(served, loop)
         try:
             until(frame, lambda n: min(n.values()) > STAYS_PX)
-            seen = [shot(frame) for _ in range(4)]
+            shots = [shot(frame) for _ in range(4)]
         finally:
             walking.stop()
         until(frame, lambda n: max(n.values()) < STAYS_PX)
         browser.close()
     for side in SIDES:
-        masks = [pixels_of(x, TINTS[False][side]) for x in seen]
+        masks = [pixels_of(x, TINTS[False][side]) for x in shots]
         moved = [int(np.sum(a ^ b)) for a, b in itertools.pairwise(masks)]
         assert max(moved) > 300, (side, moved)

@@ -37,11 +37,11 @@ def hub_of(ward: Ward) -> Hub:
 
 @pytest.fixture
 async def session_id(ward: Ward) -> AsyncIterator[str]:
-    """A session of its own, whose views are gone afterwards."""
+    """Separate session whose views are closed afterwards."""
     with ward.clinic.db.write() as c:
         patient_id = patients.create(c, None, code=f"L-{uuid4().hex[:8]}", height_m=1.8).id
-        made = sessions.create(c, None, patient_id).id
-    yield made
+        result = sessions.create(c, None, patient_id).id
+    yield result
     await views_of(ward).close()
 
 
@@ -125,8 +125,8 @@ async def test_pictures_reach_those_who_look_at_this_session_and_no_other(
     ward: Ward, session_id: str
 ) -> None:
     headers = ward.cookie()
-    src, other = await opened(ward, headers, session_id), await opened(ward, headers, ward.session_id)
-    async with looking(ward, headers, src) as mine, looking(ward, ward.cookie("admin"), other) as theirs:
+    src, other_page = await opened(ward, headers, session_id), await opened(ward, headers, ward.session_id)
+    async with looking(ward, headers, src) as mine, looking(ward, ward.cookie("admin"), other_page) as theirs:
         await _quiet(mine)
         await _quiet(theirs)
         hub_of(ward).room(session_id).show(picture(30))
@@ -134,7 +134,7 @@ async def test_pictures_reach_those_who_look_at_this_session_and_no_other(
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(theirs.recv(), 0.3)
         assert not the_view(ward, src).figure.is_grey
-        assert the_view(ward, other).figure.is_grey
+        assert the_view(ward, other_page).figure.is_grey
         await _come(lambda: the_view(ward, src).figure.is_grey)  # nothing more comes
 
 
@@ -159,11 +159,11 @@ async def test_who_comes_back_finds_the_same_figure_and_after_it_was_stopped_a_n
     assert room.is_empty
     async with browser(ward) as client:
         assert (await client.get(src, headers=headers)).status_code == 404
-    again = await opened(ward, headers, session_id)
-    assert again != src
-    async with looking(ward, headers, again):
+    second_page = await opened(ward, headers, session_id)
+    assert second_page != src
+    async with looking(ward, headers, second_page):
         hub.room(session_id).show(picture(31))
-        assert not the_view(ward, again).figure.is_grey
+        assert not the_view(ward, second_page).figure.is_grey
 
 
 async def test_the_last_picture_is_there_for_who_opens_the_page_later(ward: Ward, session_id: str) -> None:
@@ -177,10 +177,10 @@ async def test_the_last_picture_is_there_for_who_opens_the_page_later(ward: Ward
             assert the_view(ward, dark).figure._t_s == pytest.approx(40 / 30)
 
 
-async def _come(what: Callable[[], bool]) -> None:
+async def _come(label: Callable[[], bool]) -> None:
     """Wait for something."""
     async with asyncio.timeout(5):
-        while not what():
+        while not label():
             await asyncio.sleep(0.02)
 
 

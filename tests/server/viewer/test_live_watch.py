@@ -1,4 +1,4 @@
-"""From what the estimator says to one figure, and which walk is laid beside it."""
+"""Estimator output to avatar, and selection of the overlaid walk."""
 
 from __future__ import annotations
 
@@ -150,10 +150,10 @@ def reference(trained: Side | None = None, norm: dict[str, np.ndarray] = NORM) -
     return LiveReference(walk.BODY, lambda _: norm, lambda: trained)
 
 
-def knee(found: ReferenceWalk | None, phase: float) -> float:
+def knee(result: ReferenceWalk | None, phase: float) -> float:
     """Knee flexion of both legs at one phase."""
-    assert found is not None
-    posed = found.at(dict.fromkeys(SIDES, phase), (0.0, 0.0), 0.0)
+    assert result is not None
+    posed = result.at(dict.fromkeys(SIDES, phase), (0.0, 0.0), 0.0)
     assert posed is not None
     q = {s: posed[0][k] for k, s in enumerate(SEGMENTS)}
     left, right = (-cardan_zxy(multiply(conjugate(q[THIGH[side]]), q[SHANK[side]]))[0] for side in SIDES)
@@ -162,65 +162,65 @@ def knee(found: ReferenceWalk | None, phase: float) -> float:
 
 
 def test_the_better_side_is_the_one_that_moves_more_like_the_norm() -> None:
-    told = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
-    found = reference().find("better", told, dict)
-    assert found is not None
-    assert found.lead == "right"
-    assert knee(found, 0.73) == pytest.approx(float(walk.KNEE(0.74)), abs=np.radians(1.5))
+    notices = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
+    matches = reference().find("better", notices, dict)
+    assert matches is not None
+    assert matches.lead == "right"
+    assert knee(matches, 0.73) == pytest.approx(float(walk.KNEE(0.74)), abs=np.radians(1.5))
     assert find_better_side({"left": Leg("left").curves()}, NORM) is None
 
 
 def test_the_side_that_is_trained_is_not_the_better_one() -> None:
-    told = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
-    found = reference("right").find("better", told, dict)
-    assert found is not None
-    assert found.lead == "left"
-    assert knee(found, 0.73) == pytest.approx(0.5 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
+    notices = (stride(0, Leg("left", 0.5)), stride(1, Leg("right")))
+    matches = reference("right").find("better", notices, dict)
+    assert matches is not None
+    assert matches.lead == "left"
+    assert knee(matches, 0.73) == pytest.approx(0.5 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
 
 
 def test_it_is_the_mean_of_the_last_strides_that_count() -> None:
-    told = [stride(n, Leg("right", 0.2), counted=n != 3) for n in range(4)]
-    told += [stride(n, Leg("right", 1.0 if n % 2 else 0.8)) for n in range(4, 9)]
-    told += [stride(9, Leg("right", 5.0), counted=False), stride(8, Leg("right", 0.8))]
-    found = reference("left").find("better", tuple(told), dict)
-    assert knee(found, 0.73) == pytest.approx(0.88 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
+    strides = [stride(n, Leg("right", 0.2), counted=n != 3) for n in range(4)]
+    strides += [stride(n, Leg("right", 1.0 if n % 2 else 0.8)) for n in range(4, 9)]
+    strides += [stride(9, Leg("right", 5.0), counted=False), stride(8, Leg("right", 0.8))]
+    matches = reference("left").find("better", tuple(strides), dict)
+    assert knee(matches, 0.73) == pytest.approx(0.88 * float(walk.KNEE(0.74)), abs=np.radians(1.0))
 
 
 def test_a_new_stride_changes_the_mean() -> None:
-    found = reference("left")
+    result = reference("left")
     one = (stride(0, Leg("right", 0.5)),)
-    first = found.find("better", one, dict)
-    assert found.find("better", one, dict) is first
-    second = found.find("better", (*one, stride(2, Leg("right", 1.0))), dict)
+    first = result.find("better", one, dict)
+    assert result.find("better", one, dict) is first
+    second = result.find("better", (*one, stride(2, Leg("right", 1.0))), dict)
     assert knee(second, 0.73) > knee(first, 0.73) + np.radians(5)
 
 
 def test_the_norm_walks_at_the_speed_of_the_last_strides() -> None:
-    asked: list[float | None] = []
+    requests: list[float | None] = []
 
     def norm_at(speed_mps: float | None) -> dict[str, np.ndarray]:
-        asked.append(speed_mps)
+        requests.append(speed_mps)
         bands = look_up_norms(40, None, speed_mps, 1.7).bands
         return {name: np.radians(band.mean_deg) for name, band in bands.items()}
 
-    shown = LiveReference(walk.BODY, norm_at, lambda: None)
+    view = LiveReference(walk.BODY, norm_at, lambda: None)
     slow = tuple(stride(n, Leg("left"), speed_mps=0.41) for n in range(3))
-    first = shown.find("norm", slow[:2], dict)
-    second = shown.find("norm", slow, dict)
-    assert asked == [None, pytest.approx(0.4)], "in steps, so that it does not waver"
+    first = view.find("norm", slow[:2], dict)
+    second = view.find("norm", slow, dict)
+    assert requests == [None, pytest.approx(0.4)], "in steps, so that it does not waver"
     assert knee(first, 0.72) - knee(second, 0.72) > np.radians(12.0)
     crawling = tuple(stride(n, Leg("left"), speed_mps=0.2) for n in range(3))
-    assert shown.find("norm", crawling, dict) is None, "nobody in the reference walked as slowly"
+    assert view.find("norm", crawling, dict) is None, "nobody in the reference walked as slowly"
     assert reference(norm={}).find("norm", (), dict) is None
 
 
 def test_standing_angles_are_put_back_so_that_the_mirror_has_the_persons_own_posture() -> None:
     i = 70
-    shown = FeedFrame("erkf", {}, {n: float(np.degrees(x[i])) for n, x in raw_angles(zeroed=True).items()})
-    found = find_standing_angles(moment_at(i), shown.angles_deg)
+    view = FeedFrame("erkf", {}, {n: float(np.degrees(x[i])) for n, x in raw_angles(zeroed=True).items()})
+    result = find_standing_angles(moment_at(i), view.angles_deg)
     raw = {name: x[0] for name, x in raw_angles(zeroed=False).items()}
     for name, value in raw.items():
-        assert found[name] == pytest.approx(value, abs=1e-6), name
+        assert result[name] == pytest.approx(value, abs=1e-6), name
     curves = {"knee_flexion": np.full(101, 0.3), "pelvis_obliquity": np.full(101, 0.1)}
     left = add_standing_angles(curves, {"knee_flexion_l": 0.05, "pelvis_obliquity": 0.02}, "left")
     assert left["knee_flexion"][0] == pytest.approx(0.35)
@@ -228,9 +228,9 @@ def test_standing_angles_are_put_back_so_that_the_mirror_has_the_persons_own_pos
 
 
 def moment_at(i: int) -> FigureMoment:
-    made: Picture = picture(i)
-    assert made.pose is not None
-    return read_moment(made, made.pose, FeedFrame("erkf", {}, {}))
+    result: Picture = picture(i)
+    assert result.pose is not None
+    return read_moment(result, result.pose, FeedFrame("erkf", {}, {}))
 
 
 def raw_angles(*, zeroed: bool) -> dict[str, np.ndarray]:

@@ -66,13 +66,13 @@ def test_left_and_right_have_the_colours_of_the_charts(motion: ReplayMotion) -> 
 
 def lowest_of(motion: ReplayMotion, names: tuple[PartName, ...], i: int) -> float:
     """Height of the lowest vertex of some parts at frame i, m."""
-    found = []
+    result = []
     for name in names:
         batch = motion.batches[name]
         for k in range(len(batch.tint)):
             turned = rotation.rotate(batch.wxyz[i, k].astype(float), batch.mesh[0].astype(float))
-            found.append((turned + batch.position[i, k])[:, 2].min())
-    return float(min(found))
+            result.append((turned + batch.position[i, k])[:, 2].min())
+    return float(min(result))
 
 
 FEET: tuple[PartName, ...] = ("foot_l", "foot_r", "toes_l", "toes_r")
@@ -119,10 +119,10 @@ def test_the_figure_stays_in_view_while_its_sway_is_kept(motion: ReplayMotion) -
 
 def test_positions_that_are_for_the_eye_only_leave_no_trail() -> None:
     poses = walk.poses(3.0)
-    seen = prepare_motion(replace(poses, method="stance_foot_anchor"))
-    assert not seen.placed
-    assert seen.trails == {}
-    assert set(seen.prints) == {"left", "right"}
+    observations = prepare_motion(replace(poses, method="stance_foot_anchor"))
+    assert not observations.placed
+    assert observations.trails == {}
+    assert set(observations.prints) == {"left", "right"}
     assert set(prepare_motion(replace(poses, method="erkf_smoothed")).trails) == {"left", "right"}
 
 
@@ -135,23 +135,23 @@ def test_positions_that_are_for_the_eye_only_leave_no_trail() -> None:
     ],
 )
 def test_what_no_sensor_supports_is_marked(method: str, measured: set[str]) -> None:
-    seen = prepare_motion(replace(walk.poses(3.0), method=method))
+    observations = prepare_motion(replace(walk.poses(3.0), method=method))
     thigh, shank, foot, pelvis = (x in measured for x in ("thigh", "shank", "foot", "pelvis"))
     expected: dict[PartName, bool] = {"thighs": thigh, "shanks": shank, "foot_l": foot, "toes_r": foot}
-    for name, worn in expected.items():
-        assert set(seen.batches[name].measured) == {worn}, name
-    assert seen.batches["pelvis"].measured == seen.batches["trunk"].measured == (pelvis,)
-    assert seen.measured == (thigh and pelvis)
+    for name, segment_names in expected.items():
+        assert set(observations.batches[name].measured) == {segment_names}, name
+    assert observations.batches["pelvis"].measured == observations.batches["trunk"].measured == (pelvis,)
+    assert observations.measured == (thigh and pelvis)
 
 
 def test_lost_samples_are_marked_and_never_nan() -> None:
     poses = walk.poses(lost=(3.0, 4.0))
     poses.q["shank_l"][300:400] = np.nan
-    found = prepare_motion(poses)
-    assert not found.valid[found.index(3.5)]
-    assert found.valid[found.index(2.9)]
-    assert all(np.isfinite(b.wxyz).all() and np.isfinite(b.position).all() for b in found.batches.values())
-    assert np.isfinite(found.root).all()
+    result = prepare_motion(poses)
+    assert not result.valid[result.index(3.5)]
+    assert result.valid[result.index(2.9)]
+    assert all(np.isfinite(b.wxyz).all() and np.isfinite(b.position).all() for b in result.batches.values())
+    assert np.isfinite(result.root).all()
 
 
 def test_times_outside_are_held_at_the_ends(motion: ReplayMotion) -> None:
@@ -165,11 +165,11 @@ def test_times_outside_are_held_at_the_ends(motion: ReplayMotion) -> None:
     "segments", [("foot_l", "foot_r"), ("pelvis", "foot_l", "foot_r"), ("pelvis",), ("thigh_r", "shank_r")]
 )
 def test_any_subset_of_segments_makes_a_figure(segments: tuple[Segment, ...]) -> None:
-    found = prepare_motion(subset(walk.poses(), *segments))
-    assert ("rings" in found.batches) == ("shank_r" in segments)
-    assert found.batches
-    assert set(found.hidden) | set(segments) == set(LOWER_BODY)
-    assert not set(found.hidden) & set(segments)
+    result = prepare_motion(subset(walk.poses(), *segments))
+    assert ("rings" in result.batches) == ("shank_r" in segments)
+    assert result.batches
+    assert set(result.hidden) | set(segments) == set(LOWER_BODY)
+    assert not set(result.hidden) & set(segments)
 
 
 def test_no_pose_at_all_says_so() -> None:

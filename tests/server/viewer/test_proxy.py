@@ -108,11 +108,11 @@ async def test_a_tab_gets_its_own_view_and_a_reload_the_same(ward: Ward) -> None
     async with replaying(ward, headers, tab="a") as (_, first):
         pass
     async with (
-        replaying(ward, headers, tab="a") as (_, again),
-        replaying(ward, headers, tab="b") as (_, other),
+        replaying(ward, headers, tab="a") as (_, repeat),
+        replaying(ward, headers, tab="b") as (_, second),
     ):
-        assert first["view"] == again["view"]
-        assert other["view"] != again["view"]
+        assert first["view"] == repeat["view"]
+        assert second["view"] != repeat["view"]
 
 
 async def test_a_page_may_load_the_client_while_its_view_is_being_opened(ward: Ward) -> None:
@@ -131,8 +131,8 @@ async def test_a_page_may_load_the_client_while_its_view_is_being_opened(ward: W
         view = views_of(ward).find(name, *_login_of(ward, headers))
         assert view is not None
         assert view is views_of(ward).find(view.id, *_login_of(ward, headers))
-    taken = {**ward.cookie("admin")}
-    async with connect(url, additional_headers=taken, proxy=None) as theirs:
+    selection = {**ward.cookie("admin")}
+    async with connect(url, additional_headers=selection, proxy=None) as theirs:
         assert json.loads(await theirs.recv())["view"] != name, "of somebody else the name is not heard"
 
 
@@ -251,11 +251,11 @@ async def test_a_forged_request_to_share_never_reaches_viser(ward: Ward) -> None
     async with replaying(ward, headers) as (_, opened):
         view = views_of(ward).find(str(opened["view"]), *_login_of(ward, headers))
         assert isinstance(view, FigureView)
-        seen: list[str] = []
+        names: list[str] = []
         handle = view.server._websock_server._handle_incoming_message
 
         async def spy(client: object, message: object) -> None:
-            seen.append(type(message).__name__)
+            names.append(type(message).__name__)
             await handle(client, message)
 
         view.server._websock_server._handle_incoming_message = spy
@@ -264,11 +264,11 @@ async def test_a_forged_request_to_share_never_reaches_viser(ward: Ward) -> None
             await ws.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
             await ws.send(msgspec.msgpack.encode(_camera()))
             for _ in range(100):
-                if seen:
+                if names:
                     break
                 await asyncio.sleep(0.02)
-        assert seen
-        assert set(seen) == {"ViewerCameraMessage"}
+        assert names
+        assert set(names) == {"ViewerCameraMessage"}
 
 
 def _camera() -> dict[str, object]:
@@ -287,5 +287,5 @@ def _camera() -> dict[str, object]:
 
 
 def _login_of(ward: Ward, headers: dict[str, str]) -> tuple[str, Role]:
-    who: Identity = ward.clinic.app.state.logins.find(headers["Cookie"].removeprefix("sid="))
-    return who.login_id, who.role
+    user: Identity = ward.clinic.app.state.logins.find(headers["Cookie"].removeprefix("sid="))
+    return user.login_id, user.role

@@ -1,4 +1,4 @@
-"""A walk as one HTML file: what the browser will play, taken out of it again."""
+"""Walk as one HTML file, extracted from it again."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ def test_every_moment_of_the_walk_is_in_the_page_and_nothing_is_fetched() -> Non
     page = record_walk(walk.poses(duration_s)).decode()
     assert "<title>Sagittal</title>" in page
     assert not re.search(r'(?:src|href)="https?:', page)
-    found = re.search(r'__VISER_EMBED_DATA__="([^"]+)"', page)
-    assert found is not None
-    data = base64.b64decode(found[1])
+    match = re.search(r'__VISER_EMBED_DATA__="([^"]+)"', page)
+    assert match is not None
+    data = base64.b64decode(match[1])
     inner = zstandard.ZstdDecompressor().decompress(
         data[8:], max_output_size=int.from_bytes(data[:8], "little")
     )
-    said = msgspec.msgpack.decode(inner[8 : 8 + int.from_bytes(inner[:8], "little")])
-    assert said["durationSeconds"] == pytest.approx(duration_s, abs=2.0 / RATE_HZ)
-    kinds = {message["type"] for _, message in said["messages"]}
+    text = msgspec.msgpack.decode(inner[8 : 8 + int.from_bytes(inner[:8], "little")])
+    assert text["durationSeconds"] == pytest.approx(duration_s, abs=2.0 / RATE_HZ)
+    kinds = {message["type"] for _, message in text["messages"]}
     assert {"SetCameraPositionMessage", "SetCameraLookAtMessage", "BatchedMeshesMessage"} <= kinds
-    moved = {round(t, 3) for t, m in said["messages"] if "batched_wxyzs" in m.get("updates", ())}
+    moved = {round(t, 3) for t, m in text["messages"] if "batched_wxyzs" in m.get("updates", ())}
     assert sorted(moved) == pytest.approx(np.arange(0.0, duration_s - 0.02, 1.0 / RATE_HZ).tolist())
 
 

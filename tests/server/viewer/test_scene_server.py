@@ -1,4 +1,4 @@
-"""Scene servers that nobody but this user can reach."""
+"""Scene servers reachable only by this user."""
 
 from __future__ import annotations
 

@@ -38,9 +38,9 @@ def without_contact(poses: Poses) -> Poses:
 
 def test_one_print_lies_under_each_contact_and_appears_during_it() -> None:
     path, contact = stepping()
-    found = find_prints(T_S, np.ones(500, bool), contact, path, FLAT)
-    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
-    assert np.all((found.t_s % 2.0) < 1.0)
+    prints = find_prints(T_S, np.ones(500, bool), contact, path, FLAT)
+    np.testing.assert_allclose(prints.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
+    assert np.all((prints.t_s % 2.0) < 1.0)
 
 
 def test_prints_are_a_stride_apart_on_a_walk(motion: ReplayMotion) -> None:
@@ -57,73 +57,73 @@ def test_prints_are_those_of_the_simulated_walker(name: str, known: bool) -> Non
     always = np.ones(len(truth.t_s), bool)
     contact = {FOOT[s]: c if known else always for s, c in truth.contact.items()}
     poses = Poses(truth.t_s, truth.rate_hz, truth.q, truth.p, always, contact, truth.body, "erkf_smoothed")
-    found = prepare_motion(poses).prints
+    prints = prepare_motion(poses).prints
     for side in SIDES:
         true = truth.footprints[side]
         heading = np.array([f.foot_rad for f in true])
-        assert len(found[side].t_s) == len(true)
+        assert len(prints[side].t_s) == len(true)
         ahead = 0.25 * truth.body.foot * np.stack((np.cos(heading), np.sin(heading)), axis=1)
         place = np.array([(f.x_m, f.y_m) for f in true]) + ahead
-        np.testing.assert_allclose(found[side].position[:, :2], place, atol=0.01)
-        turned = rotation.yaw(found[side].wxyz.astype(float)) - heading
+        np.testing.assert_allclose(prints[side].position[:, :2], place, atol=0.01)
+        turned = rotation.yaw(prints[side].wxyz.astype(float)) - heading
         np.testing.assert_allclose(np.angle(np.exp(1j * turned)), 0, atol=np.radians(1))
 
 
 def test_a_print_lies_flat_and_points_where_the_toes_point() -> None:
     path, contact = stepping()
     turned = rotation.multiply(rotation.about(2, np.radians(30)), rotation.about(1, np.radians(-12)))
-    found = find_prints(T_S, np.ones(500, bool), contact, path, np.tile(turned, (500, 1)))
-    np.testing.assert_allclose(np.degrees(rotation.yaw(found.wxyz.astype(float))), 30, atol=1e-4)
-    up = rotation.rotate(found.wxyz.astype(float), np.array([0.0, 0.0, 1.0]))
+    prints = find_prints(T_S, np.ones(500, bool), contact, path, np.tile(turned, (500, 1)))
+    np.testing.assert_allclose(np.degrees(rotation.yaw(prints.wxyz.astype(float))), 30, atol=1e-4)
+    up = rotation.rotate(prints.wxyz.astype(float), np.array([0.0, 0.0, 1.0]))
     np.testing.assert_allclose(up, [[0, 0, 1]] * 5, atol=1e-6)
-    assert np.ptp(found.position[:, 2]) == 0
+    assert np.ptp(prints.position[:, 2]) == 0
 
 
 def test_a_restless_standing_foot_leaves_one_print() -> None:
     wobble = np.stack((0.004 * np.sin(9 * T_S), 0 * T_S, 0 * T_S), axis=1)
-    found = find_prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
-    assert len(found.t_s) == 1
+    prints = find_prints(T_S, np.ones(500, bool), np.sin(20 * T_S) > 0, wobble, FLAT)
+    assert len(prints.t_s) == 1
 
 
 def test_a_step_that_the_contacts_miss_leaves_its_print() -> None:
     path, contact = stepping()
     missed = contact | ((T_S > 2.9) & (T_S < 4.1))
-    found = find_prints(T_S, np.ones(500, bool), missed, path, FLAT)
-    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
+    prints = find_prints(T_S, np.ones(500, bool), missed, path, FLAT)
+    np.testing.assert_allclose(prints.position[:, 0], 1.2 * np.arange(5), atol=1e-5)
 
 
 def test_a_foot_that_slides_through_its_contact_leaves_a_print_all_the_same() -> None:
-    found = find_prints(T_S, np.ones(500, bool), (T_S > 3) & (T_S < 4), straight(0.5), FLAT)
-    assert len(found.t_s) == 1
-    assert 3 < found.t_s[0] < 4
+    prints = find_prints(T_S, np.ones(500, bool), (T_S > 3) & (T_S < 4), straight(0.5), FLAT)
+    assert len(prints.t_s) == 1
+    assert 3 < prints.t_s[0] < 4
 
 
 def test_a_foot_that_never_rests_leaves_no_print() -> None:
-    found = find_prints(T_S, np.ones(500, bool), np.zeros(500, bool), straight(), FLAT)
-    assert found.position.shape == (0, 3)
-    assert found.wxyz.shape == (0, 4)
+    prints = find_prints(T_S, np.ones(500, bool), np.zeros(500, bool), straight(), FLAT)
+    assert prints.position.shape == (0, 3)
+    assert prints.wxyz.shape == (0, 4)
 
 
 def test_no_print_comes_from_samples_that_were_lost() -> None:
     path, contact = stepping()
-    found = find_prints(T_S, (T_S < 3.9) | (T_S > 5.2), contact, path, FLAT)
-    np.testing.assert_allclose(found.position[:, 0], 1.2 * np.array([0, 1, 3, 4]), atol=1e-5)
+    prints = find_prints(T_S, (T_S < 3.9) | (T_S > 5.2), contact, path, FLAT)
+    np.testing.assert_allclose(prints.position[:, 0], 1.2 * np.array([0, 1, 3, 4]), atol=1e-5)
 
 
 def test_a_trail_is_one_line_in_short_pieces() -> None:
-    found = lay_trail(T_S, np.ones(500, bool), straight())
-    length = np.linalg.norm(found.pieces[:, 1] - found.pieces[:, 0], axis=1)
+    result = lay_trail(T_S, np.ones(500, bool), straight())
+    length = np.linalg.norm(result.pieces[:, 1] - result.pieces[:, 0], axis=1)
     assert length.max() < PIECE_M + 0.021  # a sample's way more at most
     np.testing.assert_allclose(length.sum(), straight()[-1, 0], rtol=1e-5)
-    np.testing.assert_array_equal(found.pieces[1:, 0], found.pieces[:-1, 1])
-    assert np.all(np.diff(found.t_s) > 0)
+    np.testing.assert_array_equal(result.pieces[1:, 0], result.pieces[:-1, 1])
+    assert np.all(np.diff(result.t_s) > 0)
 
 
 def test_a_trail_ends_where_the_foot_is(motion: ReplayMotion) -> None:
     for side in SIDES:
-        found = motion.trails[side]
+        trails = motion.trails[side]
         for t_s in (2.0, 5.5, 9.0):
-            last = found.pieces[np.searchsorted(found.t_s, t_s, side="right") - 1, 1]
+            last = trails.pieces[np.searchsorted(trails.t_s, t_s, side="right") - 1, 1]
             foot = motion.batches["foot_l" if side == "left" else "foot_r"]
             ankle = foot.position[motion.index(t_s), 0]
             assert np.hypot(*(last - ankle)[:2]) < 0.25 * walk.BODY.foot + PIECE_M + 0.1
@@ -137,11 +137,11 @@ def test_a_trail_has_a_gap_where_samples_were_lost() -> None:
     valid = (T_S < 4.0) | (T_S >= 6.0)
     path = straight()
     path[~valid] = path[199]
-    found = lay_trail(T_S, valid, path)
-    assert found.pieces[..., 0].max() > 9.9
-    inside = (found.pieces[..., 0] > 3.99) & (found.pieces[..., 0] < 5.99)
+    result = lay_trail(T_S, valid, path)
+    assert result.pieces[..., 0].max() > 9.9
+    inside = (result.pieces[..., 0] > 3.99) & (result.pieces[..., 0] < 5.99)
     assert not inside.any()
-    assert np.all(np.linalg.norm(found.pieces[:, 1] - found.pieces[:, 0], axis=1) < 0.1)
+    assert np.all(np.linalg.norm(result.pieces[:, 1] - result.pieces[:, 0], axis=1) < 0.1)
 
 
 def test_a_trail_of_nothing_valid_is_empty() -> None:
@@ -149,9 +149,9 @@ def test_a_trail_of_nothing_valid_is_empty() -> None:
 
 
 def test_a_take_without_contacts_has_trails_and_no_prints() -> None:
-    found = prepare_motion(without_contact(walk.poses(3.0)))
-    assert found.prints == {}
-    assert set(found.trails) == {"left", "right"}
+    result = prepare_motion(without_contact(walk.poses(3.0)))
+    assert result.prints == {}
+    assert set(result.trails) == {"left", "right"}
 
 
 def test_one_foot_leaves_its_own_prints_and_trail_only() -> None:
@@ -162,6 +162,6 @@ def test_one_foot_leaves_its_own_prints_and_trail_only() -> None:
         p={"foot_r": poses.p["foot_r"]},
         contact={"foot_r": poses.contact[FOOT["right"]]},
     )
-    found = prepare_motion(one)
-    assert set(found.prints) == set(found.trails) == {"right"}
-    assert len(found.prints["right"].t_s) >= 4
+    result = prepare_motion(one)
+    assert set(result.prints) == set(result.trails) == {"right"}
+    assert len(result.prints["right"].t_s) >= 4

@@ -15,8 +15,8 @@ from tests.server import walk
 
 def outlines(svg: str) -> list[tuple[str, np.ndarray]]:
     """Class and points (n, 2) px of each part, from back to front."""
-    found = re.findall(r'<path class="([^"]+)" d="M([^z]+)z"', svg)
-    return [(css, np.array([p.split() for p in d.split("L")], float)) for css, d in found]
+    matches = re.findall(r'<path class="([^"]+)" d="M([^z]+)z"', svg)
+    return [(css, np.array([p.split() for p in d.split("L")], float)) for css, d in matches]
 
 
 @pytest.mark.parametrize(("near", "far", "side"), [("st-l", "st-r", "left"), ("st-r", "st-l", "right")])

@@ -44,8 +44,8 @@ async def test_a_view_is_found_by_the_names_of_its_last_few_loads(motion: Replay
     async with FigureViews().run() as views:
         for k in range(MOST_NAMES + 2):
             view = await views.open("login", "tab", "session", "analysis", lambda: motion, name=f"{k:032x}")
-        found = [views.find(f"{k:032x}", "login", Role.VIEWER) for k in range(MOST_NAMES + 2)]
-        assert found == [None, None, *[view] * MOST_NAMES]
+        matches = [views.find(f"{k:032x}", "login", Role.VIEWER) for k in range(MOST_NAMES + 2)]
+        assert matches == [None, None, *[view] * MOST_NAMES]
         assert views.find(view.id, "login", Role.VIEWER) is view
         assert len(views) == 1
 
@@ -89,9 +89,9 @@ async def test_a_folder_that_takes_no_sockets_is_told_and_not_waited_for(
     (tmp_path / ("a" * 100)).mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
     async with FigureViews().run() as views:
-        with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as told:
+        with pytest.raises(EstimationError, match=f"{why}.*set TMPDIR") as error:
             await views.open("login", "tab", "session", "analysis", lambda: motion)
-    assert told.value.code == "no_place_for_views"
+    assert error.value.code == "no_place_for_views"
     assert list(tmp_path.rglob("sagittal-view-*")) == []
 
 

@@ -1,4 +1,4 @@
-"""What we rely on inside viser beyond its public API (a new version must keep it or we must adapt)."""
+"""Private parts of viser that we rely on; a new version must keep them or our code must change."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def test_the_client_can_be_unpacked() -> None:
     assert plain is not None, "viser packs its client in another way: server/viewer/client.py must follow"
     style = re.search(r'data-ss="(\d+)" data-cs="(\d+)"', page)
     assert style is not None
-    shown = re.search(
+    visible_match = re.search(
         r'<style>(.*?)</style><script type="text/plain" id="client">(.*?)</script>', plain, re.DOTALL
     )
-    assert shown is not None
-    assert [len(part.encode()) for part in shown.groups()] == [int(n) for n in style.groups()]
+    assert visible_match is not None
+    assert [len(part.encode()) for part in visible_match.groups()] == [int(n) for n in style.groups()]
     assert "data-p=" not in plain
     assert unpack_page("<head><script>another()</script></head>") is None
 
@@ -88,10 +88,10 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
     try:
         drawn = prepare_motion(walk.poses(1.0)).batches["thighs"]
         handle = DrawnBatch(server.scene, "thighs", drawn, None).handle
-        kept = server._websock_server._broadcast_buffer.message_from_id
-        before = set(kept)
+        stored_message_from_id = server._websock_server._broadcast_buffer.message_from_id
+        initial_names = set(stored_message_from_id)
         move_copies(handle, drawn.wxyz[5], drawn.position[5])
-        (sent,) = [kept[k] for k in set(kept) - before]
+        (sent,) = [stored_message_from_id[k] for k in set(stored_message_from_id) - initial_names]
         plain = SceneNodeUpdateMessage(sent.name, sent.updates, sent.owner)
         ours: list[memoryview] = []
         theirs: list[memoryview] = []
@@ -105,7 +105,9 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
         # who comes later gets the newest message of a kind only, and these two always come together
         move_copies(handle, drawn.wxyz[6], drawn.position[6])
         later = [
-            m for m in kept.values() if isinstance(m, SceneNodeUpdateMessage) and m.name == "/room/thighs"
+            m
+            for m in stored_message_from_id.values()
+            if isinstance(m, SceneNodeUpdateMessage) and m.name == "/room/thighs"
         ]
         assert len(later) == 1
         np.testing.assert_array_equal(later[0].updates["batched_wxyzs"], drawn.wxyz[6])
@@ -116,17 +118,17 @@ def test_one_message_turns_and_places_a_batch_as_the_public_setters_would() -> N
 def test_lines_are_sent_as_the_public_setter_would_and_only_when_they_are_others() -> None:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
-        before, after = (np.full((4, 2, 3), x, np.float32) for x in (1.0, 2.0))
-        handle = server.scene.add_line_segments("/lines", before, (0, 0, 0))
-        kept = server._websock_server._broadcast_buffer.message_from_id
-        known = set(kept)
-        draw_lines(handle, before.copy())
-        assert set(kept) == known
-        draw_lines(handle, after)
-        (sent,) = [kept[k] for k in set(kept) - known]
-        plain = SceneNodeUpdateMessage("/lines", {"points": after}, sent.owner)
+        initial, final = (np.full((4, 2, 3), x, np.float32) for x in (1.0, 2.0))
+        handle = server.scene.add_line_segments("/lines", initial, (0, 0, 0))
+        stored_message_from_id = server._websock_server._broadcast_buffer.message_from_id
+        known_names = set(stored_message_from_id)
+        draw_lines(handle, initial.copy())
+        assert set(stored_message_from_id) == known_names
+        draw_lines(handle, final)
+        (sent,) = [stored_message_from_id[k] for k in set(stored_message_from_id) - known_names]
+        plain = SceneNodeUpdateMessage("/lines", {"points": final}, sent.owner)
         assert sent.as_serializable_dict() == plain.as_serializable_dict()
-        np.testing.assert_array_equal(handle.points, after)
+        np.testing.assert_array_equal(handle.points, final)
     finally:
         server.stop()
 
@@ -138,27 +140,27 @@ def test_a_picture_is_sent_whole_and_at_once_however_long_viser_would_gather() -
         buffer = server._websock_server._broadcast_buffer
         assert buffer.window_duration_sec == WINDOW_S
         buffer.window_duration_sec = 60.0
-        shown = dict.fromkeys(("thighs", "shanks"), prepare_motion(walk.poses(1.0)).batches["thighs"])
-        drawn = {name: DrawnBatch(server.scene, name, batch, None) for name, batch in shown.items()}
-        taken: Queue[list[str]] = Queue()
+        visible_rows = dict.fromkeys(("thighs", "shanks"), prepare_motion(walk.poses(1.0)).batches["thighs"])
+        drawn = {name: DrawnBatch(server.scene, name, batch, None) for name, batch in visible_rows.items()}
+        selection: Queue[list[str]] = Queue()
 
         async def take() -> None:
             try:
                 async with aclosing(buffer.window_generator(1)) as windows:
                     async for window in windows:
-                        taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+                        selection.put([m.name for m in window if isinstance(m, ArraysChanged)])
             finally:
-                taken.put(["nothing more"])
+                selection.put(["nothing more"])
 
         taking = asyncio.run_coroutine_threadsafe(take(), buffer.event_loop)
-        assert taken.get(timeout=30) == []  # what was there before
+        assert selection.get(timeout=30) == []  # what was there before
         for frame in range(1, 4):
             with show_at_once(server):
                 for part in drawn.values():
                     part.move(part.batch.wxyz[frame], part.batch.position[frame])
-            assert taken.get(timeout=30) == ["/room/thighs", "/room/shanks"]
+            assert selection.get(timeout=30) == ["/room/thighs", "/room/shanks"]
         taking.cancel()
-        assert taken.get(timeout=30) == ["nothing more"]
+        assert selection.get(timeout=30) == ["nothing more"]
     finally:
         server.stop()
 
@@ -170,15 +172,15 @@ def test_a_picture_that_took_longer_than_viser_gathers_is_sent_when_it_ends() ->
         buffer.window_duration_sec = 0.01
         batch = prepare_motion(walk.poses(1.0)).batches["thighs"]
         part = DrawnBatch(server.scene, "thighs", batch, None)
-        taken: Queue[list[str]] = Queue()
+        selection: Queue[list[str]] = Queue()
 
         async def take() -> None:
             async with aclosing(buffer.window_generator(1)) as windows:
                 async for window in windows:
-                    taken.put([m.name for m in window if isinstance(m, ArraysChanged)])
+                    selection.put([m.name for m in window if isinstance(m, ArraysChanged)])
 
         taking = asyncio.run_coroutine_threadsafe(take(), buffer.event_loop)
-        assert taken.get(timeout=30) == []  # what was there before
+        assert selection.get(timeout=30) == []  # what was there before
         with show_at_once(server):
             part.move(batch.wxyz[1], batch.position[1])
             # viser's thread is woken by something else, looks, and finds that it may not send yet
@@ -186,7 +188,7 @@ def test_a_picture_that_took_longer_than_viser_gathers_is_sent_when_it_ends() ->
                 looked = asyncio.run_coroutine_threadsafe(asyncio.sleep(0.002), buffer.event_loop)
                 looked.result(timeout=30)
             assert not buffer.message_event.is_set()
-        assert taken.get(timeout=30) == ["/room/thighs"]
+        assert selection.get(timeout=30) == ["/room/thighs"]
         taking.cancel()
     finally:
         server.stop()

@@ -1,4 +1,4 @@
-"""What every answer of the web server has, and has not."""
+"""Headers present and absent in every response of the web server."""
 
 from __future__ import annotations
 

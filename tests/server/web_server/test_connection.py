@@ -41,7 +41,7 @@ class Guest:
             await self.writer.wait_closed()
 
     async def is_told_or_cut(self, status: int) -> bool:
-        """Whether the server closes and says nothing but this; a reset overtakes what it says."""
+        """Whether the server closes with this response only; a reset may overtake it."""
         heard = await self.heard_until_closed()
         return heard.startswith(f"HTTP/1.1 {status}".encode()) or heard == b""
 
@@ -178,8 +178,8 @@ async def test_a_slow_upload_that_goes_on_is_kept_whole(tmp_path: Path) -> None:
         signed_in(clinic, port) as client,
     ):
         patient = (await client.post("/api/v1/patients", json={"code": "P-1"})).raise_for_status().json()
-        made = await client.post(f"/api/v1/patients/{patient['id']}/sessions", json={"title": "Walk"})
-        path = f"/api/v1/sessions/{made.raise_for_status().json()['id']}/files/walk.txt"
+        response = await client.post(f"/api/v1/patients/{patient['id']}/sessions", json={"title": "Walk"})
+        path = f"/api/v1/sessions/{response.raise_for_status().json()['id']}/files/walk.txt"
         length = {"Content-Length": str(len(chunk) * chunks)}
         stored = await client.put(path, content=slowly(), headers=length)
         assert stored.raise_for_status().json()["size"] == len(chunk) * chunks
@@ -245,31 +245,31 @@ async def test_what_is_no_websocket_handshake_is_refused_at_once(
 
 
 async def test_who_leaves_in_the_middle_of_signing_in_is_no_error(tmp_path: Path) -> None:
-    said: list[Message] = []
+    text: list[Message] = []
 
     async def receive() -> Message:
         return {"type": "http.disconnect"}
 
     async def send(message: Message) -> None:
-        said.append(message)
+        text.append(message)
 
     headers = [(b"host", b"localhost"), (b"content-length", b"9"), (b"content-type", b"application/json")]
     scope = {"type": "http", "method": "POST", "path": "/api/v1/sign-in", "query_string": b""}
     async with open_clinic(tmp_path) as clinic:
         await clinic.app({**scope, "headers": headers}, receive, send)
-    assert said[0]["status"] == 400
+    assert text[0]["status"] == 400
 
 
 async def test_streams_and_websockets_may_last(knock: Knock, impatient: int) -> None:
     """Longer than the head and the body of a request may take."""
     websocket = await knock(impatient, WEBSOCKET)
     assert await websocket.status() == 101
-    again = asyncio.Event()
+    second = asyncio.Event()
 
     async def streaming(scope: Scope, receive: Receive, send: Send) -> None:
         await send({"type": "http.response.start", "status": 200, "headers": []})
         await send({"type": "http.response.body", "body": b"first", "more_body": True})
-        await again.wait()
+        await second.wait()
         await send({"type": "http.response.body", "body": b"last"})
 
     async with (
@@ -280,7 +280,7 @@ async def test_streams_and_websockets_may_last(knock: Knock, impatient: int) -> 
         parts = stream.aiter_raw()
         assert await anext(parts) == b"first"
         await asyncio.sleep(3 * WINDOW_S)
-        again.set()
+        second.set()
         assert await anext(parts) == b"last"
     websocket.writer.write(b"\x81\x80\x00\x00\x00\x00")  # an empty text
     assert await asyncio.wait_for(websocket.reader.readexactly(2), SOON_S) == b"\x81\x05"
@@ -288,10 +288,10 @@ async def test_streams_and_websockets_may_last(knock: Knock, impatient: int) -> 
 
 async def test_beyond_the_limit_guests_are_refused_and_later_served(knock: Knock) -> None:
     async with serve(counting, most=3) as port:
-        kept = [await knock(port, HALF_HEAD) for _ in range(3)]
+        retained = [await knock(port, HALF_HEAD) for _ in range(3)]
         late = await knock(port)
         assert b"too many connections" in await late.heard_until_closed()
-        for guest in kept:
+        for guest in retained:
             guest.writer.write(b"\r\n\r\n")
             assert await guest.status() == 200
             await guest.leave()
@@ -306,8 +306,8 @@ async def test_a_websocket_message_above_the_protocols_limit_is_refused_by_its_h
     assert await guest.status() == 101
     head = b"\x82\xff" + (MOST_MESSAGE_BYTES + 1).to_bytes(8, "big") + bytes(4)
     guest.writer.write(head)
-    said = await guest.heard_until_closed()
-    assert int.from_bytes(said[2:4], "big") == 1009
+    text = await guest.heard_until_closed()
+    assert int.from_bytes(text[2:4], "big") == 1009
 
 
 def signed_in(clinic: Clinic, port: int) -> httpx.AsyncClient:

@@ -107,22 +107,22 @@ def test_without_free_descriptors_newcomers_are_closed_and_the_log_stays_short(t
                     guests[-1].sendall(b"GET /health/live HTTP/1.1\r\nHost: localhost\r\n")
             assert closed_by_the_server(guests, GUESTS - FREE) >= GUESTS - FREE
         assert is_alive(port)
-        said = log.read_text("utf-8")
-        assert "No file descriptor is free" in said
-        assert len(said.splitlines()) < FREE
+        text = log.read_text("utf-8")
+        assert "No file descriptor is free" in text
+        assert len(text.splitlines()) < FREE
 
 
 def test_the_limit_of_connections_stays_below_that_of_descriptors() -> None:
-    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    initial = resource.getrlimit(resource.RLIMIT_NOFILE)
     try:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (min(400, before[1]), before[1]))
+        resource.setrlimit(resource.RLIMIT_NOFILE, (min(400, initial[1]), initial[1]))
         room = make_room(100)
         assert room == 100
         assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] >= RESERVED + 3 * room
-        room = make_room(10 * before[1])
-        assert 0 < RESERVED + 3 * room <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] <= before[1]
+        room = make_room(10 * initial[1])
+        assert 0 < RESERVED + 3 * room <= resource.getrlimit(resource.RLIMIT_NOFILE)[0] <= initial[1]
     finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+        resource.setrlimit(resource.RLIMIT_NOFILE, initial)
 
 
 def test_what_happens_again_and_again_is_said_once_and_counted(caplog: pytest.LogCaptureFixture) -> None:

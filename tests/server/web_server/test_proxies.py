@@ -1,4 +1,4 @@
-"""Behind a proxy every user is counted by an address of their own, and nobody may make one up."""
+"""Proxies: users are counted by their own address, which they cannot forge."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ async def the_proxy(port: int, user: str, sender: str = PROXY) -> AsyncIterator[
 
 
 async def wrong_codes(port: int, user: str, times: int = WRONG_CODES) -> list[int]:
-    """What is answered to a user who types pairing codes that do not exist."""
+    """Status for a user who enters invalid pairing codes."""
     async with the_proxy(port, user) as client:
         return [
             (await client.post("/api/v1/live/pairings", json={"code": "AAAAAA"})).status_code
@@ -52,7 +52,7 @@ async def test_one_users_wrong_guesses_do_not_lock_out_the_others_behind_a_proxy
 
 @pytest.mark.slow
 async def test_an_address_that_a_user_makes_up_is_not_believed(tmp_path: Path) -> None:
-    """A proxy appends the address it sees to what the user sent."""
+    """Proxies append the real address to forged headers."""
     async with (
         open_clinic(tmp_path, behind_tls=True, trusted_proxies=(PROXY,)) as clinic,
         serve(clinic.app, clinic.settings) as port,
@@ -93,5 +93,5 @@ async def test_a_proxy_that_is_not_trusted_is_named_once_in_the_log(caplog: pyte
         for user in ("203.0.113.1", "203.0.113.2"):
             async with the_proxy(port, user) as client:
                 await client.get("/")
-    (said,) = [m for m in caplog.messages if "SAGITTAL_TRUSTED_PROXIES" in m]
-    assert PROXY in said
+    (message,) = [m for m in caplog.messages if "SAGITTAL_TRUSTED_PROXIES" in m]
+    assert PROXY in message

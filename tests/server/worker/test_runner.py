@@ -40,9 +40,9 @@ def child(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     # a real process on a real line; only its module is another one than sagittal.server.worker.child
     monkeypatch.setattr(runner, "start_child", lambda module, *given: start_child("obedient", *given))
-    made = Child(Settings(data_dir=tmp_path))
-    yield made
-    made.kill()
+    result = Child(Settings(data_dir=tmp_path))
+    yield result
+    result.kill()
 
 
 def order(kind: str) -> Order:

@@ -24,26 +24,26 @@ load(Settings(data_dir=Path()).task_modules)
 
 @pytest.fixture
 def clinic(tmp_path: Path) -> Iterator[Clinic]:
-    made = Clinic(tmp_path / "home", lease_s=30.0, database_url="")
-    yield made
-    made.db.close()
+    new_clinic = Clinic(tmp_path / "home", lease_s=30.0, database_url="")
+    yield new_clinic
+    new_clinic.db.close()
 
 
-def quiet(*said: object) -> None:
-    """A worker that listens to nobody."""
+def quiet(*message: object) -> None:
+    """Worker without notifications."""
 
 
 ATTEMPT = Attempt(quiet, quiet)
 
 
 def test_every_kind_of_job_has_its_task_and_tables_alone_keep_no_files() -> None:
-    known = {recordings.INSPECT, recordings.ANALYSE, *BESIDE}
-    assert known <= set(TASKS)
-    assert {kind for kind in known if TASKS[kind].keeps_files} == {
+    reference = {recordings.INSPECT, recordings.ANALYSE, *BESIDE}
+    assert reference <= set(TASKS)
+    assert {kind for kind in reference if TASKS[kind].keeps_files} == {
         recordings.ANALYSE, COMPARE_FILTERS, SENSITIVITY, EXPORT
     }  # fmt: skip
     assert TASKS[TUNE].publish is tunings.publish
-    assert all(TASKS[kind].kind == kind for kind in known)
+    assert all(TASKS[kind].kind == kind for kind in reference)
 
 
 def test_what_was_found_in_a_recording_stays_with_it(clinic: Clinic) -> None:
@@ -55,9 +55,9 @@ def test_what_was_found_in_a_recording_stays_with_it(clinic: Clinic) -> None:
     results = {tasks.FOUND: b'{"sensors": []}'}
     assert clinic.queue.finish(claim, lambda c: task.publish(c, claim, results, {}))
     with clinic.db.read() as c:
-        found = recordings.require_current(c, clinic.session.id)
-    assert found.state == "ready"
-    assert found.inspection == {"sensors": []}
+        current = recordings.require_current(c, clinic.session.id)
+    assert current.state == "ready"
+    assert current.inspection == {"sensors": []}
 
 
 def test_a_text_is_no_recording_and_is_refused_by_its_reader(clinic: Clinic) -> None:

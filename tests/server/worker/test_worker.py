@@ -28,13 +28,13 @@ SPACE = "0" * 32
 
 
 def claim(number: int) -> Claim:
-    given: dict[str, Any] = dict.fromkeys(inspect.signature(Claim).parameters)
-    given |= {"job_id": f"job-{number}", "attempt": 1, "kind": "told", "params": {"space": SPACE}}
-    return Claim(**given)
+    fields: dict[str, Any] = dict.fromkeys(inspect.signature(Claim).parameters)
+    fields |= {"job_id": f"job-{number}", "attempt": 1, "kind": "told", "params": {"space": SPACE}}
+    return Claim(**fields)
 
 
 class ToldChild:
-    """Leaves a checkpoint, and tells the result of its first job when it is asked a second time."""
+    """Write a checkpoint, and return the first job's result on the second attempt."""
 
     pid = 1
 
@@ -54,7 +54,7 @@ class ToldChild:
 
 
 class ToldQueue:
-    """Two jobs; what is published."""
+    """Two jobs and their published results."""
 
     def __init__(self, stop: threading.Event, leave: Callable[[], None]) -> None:
         self.stop, self.leave, self.number = stop, leave, 0
@@ -64,7 +64,7 @@ class ToldQueue:
     def listen(self) -> Iterator[Callable[[threading.Event], None]]:
         yield lambda stop: stop.set()
 
-    def claim(self, *rest: object) -> Claim | None:
+    def claim(self, *remainder: object) -> Claim | None:
         self.number += 1
         if self.number <= 2:
             return claim(self.number)
@@ -80,7 +80,7 @@ class ToldQueue:
 
     heartbeat = look
 
-    def keep(self, *rest: object) -> str:
+    def keep(self, *remainder: object) -> str:
         return "f" * 64
 
     def finish(self, this: Claim, publish: partial[None]) -> bool:
@@ -117,7 +117,7 @@ def test_a_job_that_was_left_in_its_midst_is_not_answered_for_the_next(
 def test_a_former_checkpoint_that_cannot_be_removed_stops_no_job(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[str] = []
 
-    def discard(*rest: object) -> None:
+    def discard(*remainder: object) -> None:
         tried.append("discard")
         raise StoreAway("away", refuses=False)
 
@@ -132,11 +132,11 @@ def test_a_former_checkpoint_that_cannot_be_removed_stops_no_job(monkeypatch: py
 
 
 def test_a_full_disk_is_no_error_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    def run(*rest: object) -> dict[str, bytes]:
+    def run(*remainder: object) -> dict[str, bytes]:
         raise OSError(errno.ENOSPC, "No space left on device", "walk.c3d")
 
     monkeypatch.setitem(TASKS, "told", Task("told", run, lambda *rest: None, keeps_files=False))
-    found = compute(Order("told", None, [], {}), cast("BlobStore", None), cast("Channel", None))
-    assert isinstance(found, Failure)
-    assert (found.code, found.passing) == ("disk_full", False)
-    assert "disk is full" in found.message
+    result = compute(Order("told", None, [], {}), cast("BlobStore", None), cast("Channel", None))
+    assert isinstance(result, Failure)
+    assert (result.code, result.passing) == ("disk_full", False)
+    assert "disk is full" in result.message

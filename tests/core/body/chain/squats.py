@@ -36,10 +36,10 @@ def squat_on(
     )
 
 
-def stack_signals(made: SquatSimulation, side: Side) -> tuple[Floats, Floats]:
+def stack_signals(result: SquatSimulation, side: Side) -> tuple[Floats, Floats]:
     """Rates and forces (n, 3, 3) of errorless sensors, from the foot up."""
-    worn = leg_segments(side)
-    return tuple(np.stack([getattr(made.ideal[s], k) for s in worn], axis=1) for k in ("gyr", "acc"))  # type: ignore[return-value]
+    segments = leg_segments(side)
+    return tuple(np.stack([getattr(result.ideal[s], k) for s in segments], axis=1) for k in ("gyr", "acc"))  # type: ignore[return-value]
 
 
 def start_filter(
@@ -57,36 +57,38 @@ def start_filter(
 def find_errors_deg(
     motion: ChainMotion,
     leg: LegGeometry,
-    made: SquatSimulation,
+    result: SquatSimulation,
     mounts: Mapping[Segment, Floats] | None = None,
 ) -> Floats:
     """RMS errors (7,) of the angles `JOINTS`."""
     links = build_leg_chain(leg, mounts or make_fixed_mounts(leg.side)).links(motion.angles)
     q = {s: from_matrix(R) for s, R in zip(leg_segments(leg.side), links, strict=True)}
     foot = FOOT[leg.side]
-    angles = joint_angles({**q, foot: made.truth.q[foot]})
-    errors = [angles[f"{j}_{leg.side[0]}"] - made.truth.angles[f"{j}_{leg.side[0]}"] for j in JOINTS]
+    angles = joint_angles({**q, foot: result.truth.q[foot]})
+    errors = [angles[f"{j}_{leg.side[0]}"] - result.truth.angles[f"{j}_{leg.side[0]}"] for j in JOINTS]
     return np.asarray(np.degrees(np.sqrt(np.mean(np.square(errors), axis=1))))
 
 
 def run(
-    made: SquatSimulation,
+    result: SquatSimulation,
     leg: LegGeometry,
     mounts: Mapping[Segment, Floats] | None = None,
     bias_deg: float = 0.0,
     params: ChainFilterParams | None = None,
 ) -> Floats:
     """RMS errors (7,) in degrees of a chain on errorless signals with a bias of all gyroscopes, °/s."""
-    gyr, acc = stack_signals(made, leg.side)
-    motion = start_filter(acc, made.truth.rate_hz, leg, mounts, params).advance(gyr + radians(bias_deg), acc)
-    return find_errors_deg(motion, leg, made, mounts)
+    gyr, acc = stack_signals(result, leg.side)
+    motion = start_filter(acc, result.truth.rate_hz, leg, mounts, params).advance(
+        gyr + radians(bias_deg), acc
+    )
+    return find_errors_deg(motion, leg, result, mounts)
 
 
 def split(n: int, sizes: Sequence[int]) -> list[slice]:
     """Blocks of these sizes in turn, over n samples."""
-    found, at, k = [], 0, 0
-    while at < n:
+    result, position, k = [], 0, 0
+    while position < n:
         size = sizes[k % len(sizes)]
-        found.append(slice(at, min(n, at + size)))
-        at, k = at + size, k + 1
-    return found
+        result.append(slice(position, min(n, position + size)))
+        position, k = position + size, k + 1
+    return result

@@ -52,13 +52,13 @@ def random_chain(rng: np.random.Generator) -> RevoluteChain:
 
 def signals_at(chain: RevoluteChain, i: int, x: Floats, derive: bool = False) -> tuple[Floats, Floats]:
     """What sensor i reads (6,) in the state x (7, 3), and the derivatives (6, n) by its own group."""
-    s, given = make_scratch(9), arrays(chain)
-    below, motion = np.zeros((6, 3)), np.zeros((6, 3))
-    below[:3] = chain.base
+    s, inputs = make_scratch(9), arrays(chain)
+    duplicate, motion = np.zeros((6, 3)), np.zeros((6, 3))
+    duplicate[:3] = chain.base
     for k in range(i + 1):
         n = 3 * (chain.first[k + 1] - chain.first[k]) if derive and k == i else 0
-        climb(given, k, x, below, motion, n, s)
-        below = motion.copy()
+        climb(inputs, k, x, duplicate, motion, n, s)
+        duplicate = motion.copy()
     predict_signals(motion, chain.places[i], chain.mounts[i], n, s)
     return s.h.copy(), s.H[:, :n].copy()
 
@@ -73,10 +73,10 @@ def test_derivatives_are_those_of_differences(i: int) -> None:
     step = 1e-6
     for k in range(H.shape[1]):
         j, d = chain.first[i] + k // 3, k % 3
-        ahead, behind = x.copy(), x.copy()
+        ahead, duplicate = x.copy(), x.copy()
         ahead[j, d] += step
-        behind[j, d] -= step
-        slope = (signals_at(chain, i, ahead)[0] - signals_at(chain, i, behind)[0]) / (2.0 * step)
+        duplicate[j, d] -= step
+        slope = (signals_at(chain, i, ahead)[0] - signals_at(chain, i, duplicate)[0]) / (2.0 * step)
         assert H[:, k] == pytest.approx(slope, abs=2e-8 * max(1.0, np.abs(slope).max()))
 
 
@@ -140,13 +140,13 @@ def test_a_squat_is_followed_within_half_a_degree(side: Side) -> None:
 
 
 def test_a_turned_tibia_sensor_shows_in_adduction_and_a_tilted_one_in_flexion() -> None:
-    made, geometry, worn = squats(), leg(), make_fixed_mounts("right")
-    exact = run(made, geometry)
-    rolled = {**worn, SHANK["right"]: to_matrix(about(1, radians(10.0))) @ worn[SHANK["right"]]}
-    errors = run(made, geometry, rolled)
+    result, geometry, segments = squats(), leg(), make_fixed_mounts("right")
+    exact = run(result, geometry)
+    rolled = {**segments, SHANK["right"]: to_matrix(about(1, radians(10.0))) @ segments[SHANK["right"]]}
+    errors = run(result, geometry, rolled)
     assert errors[1] == pytest.approx(2.5, abs=0.8)
-    tilted = {**worn, SHANK["right"]: to_matrix(about(2, radians(5.0))) @ worn[SHANK["right"]]}
-    errors = run(made, geometry, tilted)
+    tilted = {**segments, SHANK["right"]: to_matrix(about(2, radians(5.0))) @ segments[SHANK["right"]]}
+    errors = run(result, geometry, tilted)
     assert 4.5 < errors[2] < 5.5
     assert 4.5 < errors[3] < 5.5
     assert np.abs(errors[4:] - exact[4:]).max() < 0.5

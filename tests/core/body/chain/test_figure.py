@@ -1,4 +1,4 @@
-"""Legs followed as one body: whose pelvis it is, and what a lifted foot does."""
+"""Legs followed as one body: choice of the pelvis, and lifted feet."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def leg(side: Side, stands: Bools, turned_deg: float = 0.0, known: Bools | None 
         s: np.tile(NEUTRAL, (N, 1)) for s in ("pelvis", THIGH[side], SHANK[side], FOOT[side])
     }
     q["pelvis"] = np.tile(multiply(about(2, np.radians(turned_deg)), NEUTRAL), (N, 1))
-    there = np.ones(N, np.bool_) if known is None else known
-    made = Orientations(np.arange(N) / RATE, RATE, q, dict.fromkeys(q, there), "chain")
-    return LegMotion(side, made, None, None, 0, stands)  # type: ignore[arg-type]
+    target = np.ones(N, np.bool_) if known is None else known
+    orientations = Orientations(np.arange(N) / RATE, RATE, q, dict.fromkeys(q, target), "chain")
+    return LegMotion(side, orientations, None, None, 0, stands)  # type: ignore[arg-type]
 
 
 def turn_of(q: Floats) -> Floats:
@@ -38,8 +38,8 @@ ALWAYS = np.ones(N, np.bool_)
 
 
 def test_one_leg_is_its_own_body() -> None:
-    alone = leg("left", ALWAYS)
-    assert join_legs({"left": alone}) is alone.orientations
+    single = leg("left", ALWAYS)
+    assert join_legs({"left": single}) is single.orientations
 
 
 def test_the_pelvis_is_that_of_the_leg_that_stands() -> None:
@@ -49,8 +49,8 @@ def test_the_pelvis_is_that_of_the_leg_that_stands() -> None:
     half = round(0.5 * HAND_OVER_S * RATE)
     assert turn[: N // 2 - half - 1] == pytest.approx(0.0)
     assert turn[N // 2 + half + 1 :] == pytest.approx(10.0)
-    between = turn[N // 2 - half : N // 2 + half]
-    assert np.diff(between).min() > 0.0
+    gap = turn[N // 2 - half : N // 2 + half]
+    assert np.diff(gap).min() > 0.0
     assert np.linalg.norm(joined.q["pelvis"], axis=1) == pytest.approx(1.0)
     assert joined.valid["pelvis"].all()
 

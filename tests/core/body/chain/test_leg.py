@@ -27,19 +27,19 @@ from tests.core.body.chain.squats import HEIGHT_M, squat_on
 
 @cache
 def recorded(side: Side) -> tuple[SquatSimulation, CalibratedRecording]:
-    made = squat_on(side, 100.0, MEMS, repetitions=3)
-    return made, calibrate_with_mounts(
-        synchronise(made.recording), make_fixed_mounts(side), "fixed_offset", FIXED_OFFSET
+    simulation = squat_on(side, 100.0, MEMS, repetitions=3)
+    return simulation, calibrate_with_mounts(
+        synchronise(simulation.recording), make_fixed_mounts(side), "fixed_offset", FIXED_OFFSET
     )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_squats_from_a_recording_with_noise_and_biases(side: Side) -> None:
-    made, calibrated = recorded(side)
+    recording, calibrated = recorded(side)
     leg = estimate_leg(calibrated, measure_leg(HEIGHT_M, side))
     angles = measure_angles(leg.orientations, calibrated.calibration.zero)
-    truth = made.truth.subtract_standing()
+    truth = recording.truth.subtract_standing()
     for joint in JOINTS:
         name = f"{joint}_{side[0]}"
         error = angles.angles[name] - truth[name][: len(angles.t_s)]
@@ -56,11 +56,11 @@ def test_after_a_silence_uncertain_angles_are_withheld() -> None:
     valid[800:900] = False
     sensors["thigh_r"] = replace(sensors["thigh_r"], valid=valid)
     lost = replace(calibrated, recording=replace(calibrated.recording, sensors=sensors))
-    known = estimate_leg(lost, measure_leg(HEIGHT_M, "right")).orientations.valid
-    assert known["shank_r"][800:900].all()
-    assert not known["thigh_r"][800:900].any()
-    assert not known["pelvis"][800:900].any()
-    assert known["thigh_r"][1000:].all(), "gravity shows the knee again"
+    known_valid = estimate_leg(lost, measure_leg(HEIGHT_M, "right")).orientations.valid
+    assert known_valid["shank_r"][800:900].all()
+    assert not known_valid["thigh_r"][800:900].any()
+    assert not known_valid["pelvis"][800:900].any()
+    assert known_valid["thigh_r"][1000:].all(), "gravity shows the knee again"
 
 
 @pytest.mark.parametrize(

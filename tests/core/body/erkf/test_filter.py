@@ -70,9 +70,9 @@ def boxminus(x: Floats, y: Floats) -> Floats:
 def dense_transition(F: Floats, dt: float) -> Floats:
     """F (15, 15) of one IMU from its blocks (module docstring of erkf_predict)."""
     full = np.eye(15)
-    for at, block in ((6, F[A]), (9, F[D]), (12, F[C])):
-        full[3:6, at : at + 3] = block
-        full[0:3, at : at + 3] = 0.5 * dt * block
+    for index, block in ((6, F[A]), (9, F[D]), (12, F[C])):
+        full[3:6, index : index + 3] = block
+        full[0:3, index : index + 3] = 0.5 * dt * block
     full[0:3, 3:6] = dt * np.eye(3)
     full[6:9, 6:9], full[6:9, 9:12] = F[S], F[GAMMA]
     return full
@@ -81,12 +81,12 @@ def dense_transition(F: Floats, dt: float) -> Floats:
 @pytest.mark.parametrize("first", [1.0, 0.5])
 def test_the_transition_is_the_derivative_of_the_step(first: float) -> None:
     rng = np.random.default_rng(1)
-    x, before, dt = random_nominal(rng), rng.normal(0.0, 3.0, 6), 0.02
+    x, initial, dt = random_nominal(rng), rng.normal(0.0, 3.0, 6), 0.02
     acc, gyr = rng.normal(0.0, 10.0, 3), rng.normal(0.0, 3.0, 3)
 
     def step(state: Floats) -> tuple[Floats, Floats]:
         out, F = state.copy(), np.empty((5, 3, 3))
-        move(out, before, acc, gyr, dt, first, np.empty((3, 3)), F, np.empty((10, 3)))
+        move(out, initial, acc, gyr, dt, first, np.empty((3, 3)), F, np.empty((10, 3)))
         return out, F
 
     end, blocks = step(x)
@@ -158,15 +158,15 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     full = np.zeros((n * m, n * m))
     for i in range(n):
         full[i * m : (i + 1) * m, i * m : (i + 1) * m] = dense_transition(blocks[i], dt)
-    here = with_spare_rows(P)
-    propagate(here, blocks, m, dt)
+    address = with_spare_rows(P)
+    propagate(address, blocks, m, dt)
     # on and below the diagonal
-    np.testing.assert_allclose(np.tril(here[:, : n * m]), np.tril(full @ P @ full.T), atol=1e-12)
+    np.testing.assert_allclose(np.tril(address[:, : n * m]), np.tril(full @ P @ full.T), atol=1e-12)
     unbiased = [e for e in range(n * m) if e % m < 9]
     P9, F9 = P[np.ix_(unbiased, unbiased)], full[np.ix_(unbiased, unbiased)]
-    here = with_spare_rows(P9)
-    propagate(here, blocks, 9, dt)
-    np.testing.assert_allclose(np.tril(here[:, : n * 9]), np.tril(F9 @ P9 @ F9.T), atol=1e-12)
+    address = with_spare_rows(P9)
+    propagate(address, blocks, 9, dt)
+    np.testing.assert_allclose(np.tril(address[:, : n * 9]), np.tril(F9 @ P9 @ F9.T), atol=1e-12)
     lam = rng.normal(0.0, 1.0, n * m)
     swept = lam.copy()
     propagate_back(swept, blocks, m, dt)
@@ -181,15 +181,15 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
     updated, dx, V = with_spare_rows(P), np.zeros(n * m), make_lines(2, 3, n * m)
     expected, expected_dx = P, np.zeros(n * m)
     # the second block must see what the first did to P, which is not in P yet
-    for taken, (i, j) in enumerate(((0, 2), (1, 2))):
+    for selection, (i, j) in enumerate(((0, 2), (1, 2))):
         joint_rows(x, R, m, i, j, rng.normal(0, 0.2, 3), rng.normal(0, 0.2, 3), True, place, H, y)
         dense = np.zeros((3, n * m))
-        for sign, at, turned in ((1.0, i * m, H[0]), (-1.0, j * m, H[1])):
-            dense[:, at : at + 3], dense[:, at + 6 : at + 9] = sign * np.eye(3), turned
+        for sign, index, turned in ((1.0, i * m, H[0]), (-1.0, j * m, H[1])):
+            dense[:, index : index + 3], dense[:, index + 6 : index + 9] = sign * np.eye(3), turned
         gain = expected @ dense.T @ np.linalg.inv(dense @ expected @ dense.T + sd**2 * np.eye(3))
         expected_dx = expected_dx + gain @ (y - dense @ expected_dx)
         expected = expected - gain @ dense @ expected
-        assert take_block(updated, dx, place, H, y, sd, V, taken, np.empty(9), np.empty((3, 3, 3)))
+        assert take_block(updated, dx, place, H, y, sd, V, selection, np.empty(9), np.empty((3, 3, 3)))
     subtract_blocks(updated, V, 2)
     np.testing.assert_allclose(dx, expected_dx, atol=1e-11)
     np.testing.assert_allclose(np.tril(updated[:, : n * m]), np.tril(expected), atol=1e-11)
@@ -197,9 +197,9 @@ def test_propagation_and_correction_equal_the_textbook() -> None:
 
 def test_rows_are_completed_from_below_the_diagonal() -> None:
     P = random_covariance(np.random.default_rng(4), 12)
-    below = np.tril(P)
-    complete_rows(below, 3)
-    np.testing.assert_array_equal(below[3:6], P[3:6])
+    tril = np.tril(P)
+    complete_rows(tril, 3)
+    np.testing.assert_array_equal(tril[3:6], P[3:6])
 
 
 @pytest.mark.slow
@@ -227,25 +227,29 @@ def test_the_smoother_gives_the_same_for_any_segment() -> None:
     first = start_state(take.tree, inputs, OFFLINE)
     one = smooth(first, inputs, take.tree, OFFLINE, 700)[0]
     for segment in (2, 97, 128):
-        other = smooth(first, inputs, take.tree, OFFLINE, segment)[0]
+        alternative = smooth(first, inputs, take.tree, OFFLINE, segment)[0]
         for name in ("p", "q", "heading_sd", "joint_residual"):
-            a, b = getattr(one, name), getattr(other, name)
+            a, b = getattr(one, name), getattr(alternative, name)
             np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-10, err_msg=f"{segment} {name}")
 
 
 @pytest.mark.slow
 def test_the_smoother_says_when_the_filter_is_through_and_not_before_it_broke() -> None:
-    take, said = mixed_walk(), []
+    take, message = mixed_walk(), []
     inputs = take.inputs.part(400, 700)
     smooth(
-        start_state(take.tree, inputs, OFFLINE), inputs, take.tree, OFFLINE, filtered=lambda: said.append(1)
+        start_state(take.tree, inputs, OFFLINE),
+        inputs,
+        take.tree,
+        OFFLINE,
+        filtered=lambda: message.append(1),
     )
-    assert said == [1]
+    assert message == [1]
     first = start_state(take.tree, inputs, OFFLINE)
     broken = replace(first, P=-first.P)
     with pytest.raises(EstimationError, match="positive definite"):
-        smooth(broken, inputs, take.tree, OFFLINE, filtered=lambda: said.append(2))
-    assert said == [1]
+        smooth(broken, inputs, take.tree, OFFLINE, filtered=lambda: message.append(2))
+    assert message == [1]
 
 
 def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
@@ -265,7 +269,7 @@ def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
     step[0] = 0.0
     inputs = ErkfInputs(step, acc, np.zeros((n, 1, 3)), np.ones((n, 1), bool), contact, contact & False)
     first = start_state(tree, inputs, params, (0, 1), q=np.array([[1.0, 0.0, 0.0, 0.0]]))
-    found = smooth(first, inputs, tree, params)[0].p[:, 0, 0]
+    result = smooth(first, inputs, tree, params)[0].p[:, 0, 0]
     # unknowns v_0 … v_{n-1}; v_k − v_{k−1} = mean acceleration · dt with variance σ_a² dt²
     rows, values, weights = [], [], []
     for k in range(n):
@@ -288,7 +292,7 @@ def test_the_smoother_equals_the_best_estimate_on_a_linear_problem() -> None:
     w = np.array(weights)
     best = np.linalg.lstsq(np.array(rows) * w[:, None], np.array(values) * w, rcond=None)[0]
     faster = 0.5 * dt * (acc[1:, 0, 0] + acc[:-1, 0, 0])
-    np.testing.assert_allclose(np.diff(found) / dt, best[:-1] + 0.5 * faster, atol=1e-9)
+    np.testing.assert_allclose(np.diff(result) / dt, best[:-1] + 0.5 * faster, atol=1e-9)
 
 
 # docs/science/erkf.md, "Limits on simulated walks": per seed, flexion / adduction / rotation of hip, knee,
@@ -323,20 +327,19 @@ def test_live_angles_and_strides_are_within_the_limits() -> None:
     outwards."""
     take = mixed_walk()
     track = filtered(take, LIVE)
-    found = angles_of(take, track, zeroed=False)
-    after = slice(round(12.0 * take.rate_hz), None)
+    angles = angles_of(take, track, zeroed=False)
+    final_window = slice(round(12.0 * take.rate_hz), None)
     for joint in LIMIT:
         for name in NAMES[joint]:
             limit = 2.5 if name == "hip_rotation" else 0.5
             for end in "lr":
-                error = found[f"{name}_{end}"] - take.truth.angles[f"{name}_{end}"][: len(track.q)]
-                assert np.degrees(np.sqrt(np.mean(error[after] ** 2))) < limit, (name, end)
+                error = angles[f"{name}_{end}"] - take.truth.angles[f"{name}_{end}"][: len(track.q)]
+                assert np.degrees(np.sqrt(np.mean(error[final_window] ** 2))) < limit, (name, end)
     assert np.sqrt(np.mean(stride_errors_m(take, track) ** 2)) < 0.006
 
 
 def test_joint_centres_hold_the_body_together_and_zero_velocity_the_speed() -> None:
-    """What each correction holds (docs/science/erkf.md, "Departures from the paper"): what is switched off is
-    what is lost."""
+    """Effect of each correction (docs/science/erkf.md, "Departures from the paper")."""
     take = mixed_walk()
     with_all = filtered(take, LIVE)
     loose = filtered(take, replace(LIVE, joint_centre_sd=None))

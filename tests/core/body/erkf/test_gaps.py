@@ -1,4 +1,4 @@
-"""What stands in for a lost sensor: what it last measured, then its carrier or the turning of the trunk."""
+"""Substitutes for a lost sensor: its last signals, then its carrier or the trunk's rotation."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ def bridged_walk(segment: Segment, lost_s: float) -> tuple[float, float]:
     inputs = erkf_inputs(take.tree, take.inputs.acc, take.inputs.gyr, valid, take.rate_hz)
     bad: Take = replace(take, inputs=inputs)
     track = smoothed(bad, PEOPLE)
-    found = take.tree.segment_origin(track.p, track.q)
-    true = np.stack([take.truth.p[s][: len(found)] for s in SEGMENTS], axis=1)
+    origin = take.tree.segment_origin(track.p, track.q)
+    true = np.stack([take.truth.p[s][: len(origin)] for s in SEGMENTS], axis=1)
     # distances from the pelvis are the same in any common heading
-    off = np.linalg.norm(found - found[:, :1], axis=2) - np.linalg.norm(true - true[:, :1], axis=2)
+    off = np.linalg.norm(origin - origin[:, :1], axis=2) - np.linalg.norm(true - true[:, :1], axis=2)
     i, lost = SEGMENTS.index(segment), ~valid.all(axis=1)
-    after = np.flatnonzero(lost)[-1] + 200
-    return float(np.sqrt(np.mean(off[lost, i] ** 2))), float(np.sqrt((off[after:] ** 2).mean(axis=0)).max())
+    final = np.flatnonzero(lost)[-1] + 200
+    return float(np.sqrt(np.mean(off[lost, i] ** 2))), float(np.sqrt((off[final:] ** 2).mean(axis=0)).max())
 
 
 @pytest.mark.slow
@@ -72,10 +72,10 @@ def test_a_foot_goes_with_its_shank_and_a_thigh_stays_upright_and_turns_with_the
     late = slice(round((FROM_S + HOLD_S) * take.rate_hz), round((FROM_S + 8.0) * take.rate_hz))
     foot, shank, thigh = (SEGMENTS.index(s) for s in ("foot_l", "shank_l", "thigh_l"))
     acc, gyr = filled(gap("foot_l", 8.0))
-    for made, measured in ((acc, take.inputs.acc), (gyr, take.inputs.gyr)):
-        segments = [rotate(take.tree.q_mount[i], made[late, i]) for i in (foot, shank)]
+    for result, measured in ((acc, take.inputs.acc), (gyr, take.inputs.gyr)):
+        segments = [rotate(take.tree.q_mount[i], result[late, i]) for i in (foot, shank)]
         np.testing.assert_allclose(segments[0], segments[1], atol=1e-12)
-        assert np.array_equal(made[late, shank], measured[late, shank])
+        assert np.array_equal(result[late, shank], measured[late, shank])
     acc, gyr = filled(gap("thigh_l", 8.0))
     np.testing.assert_allclose(np.linalg.norm(acc[late, thigh], axis=1), GRAVITY)
     up = acc[late, thigh] / GRAVITY
@@ -91,14 +91,14 @@ def test_without_a_neighbour_a_sensor_travels_on_upright() -> None:
         ("foot_l",), (), (0,), take.tree.q_mount[[foot]], take.tree.place[[foot]], take.tree.origin[[foot]]
     )
     valid = gap("foot_l", 2.0)
-    alone = bridge_gaps(
+    single = bridge_gaps(
         tree, take.inputs.acc[:, [foot]], take.inputs.gyr[:, [foot]], valid[:, [foot]], take.rate_hz
     )
     all_lost = np.repeat(valid[:, [foot]], len(SEGMENTS), axis=1)
     together = bridge_gaps(take.tree, take.inputs.acc, take.inputs.gyr, all_lost, take.rate_hz)
     late = slice(round((FROM_S + HOLD_S) * take.rate_hz), round((FROM_S + 2.0) * take.rate_hz))
     for acc, gyr in (
-        (alone[0][late, 0], alone[1][late, 0]),
+        (single[0][late, 0], single[1][late, 0]),
         (together[0][late, foot], together[1][late, foot]),
     ):
         assert (gyr == 0.0).all()
@@ -132,6 +132,6 @@ def test_before_its_first_sample_a_sensor_holds_that_and_no_gap_of_it_begins() -
 def test_a_sensor_lost_while_the_person_turns_comes_back_where_it_belongs(
     segment: Segment, lost_s: float
 ) -> None:
-    inside, after = bridged_walk(segment, lost_s)
+    inside, final = bridged_walk(segment, lost_s)
     assert inside < 0.05
-    assert after < 0.01
+    assert final < 0.01

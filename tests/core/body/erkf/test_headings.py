@@ -32,7 +32,7 @@ WHOLE = PRESETS["lower_body7"]
 def take(
     seed: int, wrong: dict[Segment, float]
 ) -> tuple[CalibratedRecording, Orientations, dict[Segment, float]]:
-    """A walk calibrated as it is but for some forward axes, and what is found wrong, in degrees."""
+    """Calibrated walk with some wrong anterior axes, and the errors found, degrees."""
     recording, _ = simulated("fast_with_turns", seed)
     calibrated = calibration.calibrate(recording)
     segments = dict(calibrated.calibration.segments)
@@ -43,16 +43,16 @@ def take(
     calibrated = replace(calibrated, calibration=replace(calibrated.calibration, segments=segments))
     orientations = estimate_orientations(calibrated)
     body, _ = nominal_body(recording.subject.height_m)
-    found = heading_errors(calibrated, orientations, body, WHOLE, ErkfParams.offline())
-    return calibrated, orientations, {s: degrees(x) for s, x in found.items()}
+    result = heading_errors(calibrated, orientations, body, WHOLE, ErkfParams.offline())
+    return calibrated, orientations, {s: degrees(x) for s, x in result.items()}
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("wrong", [{"thigh_l": 25.0}, {"shank_r": -20.0, "foot_l": 15.0}, {"pelvis": 20.0}])
 def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment, float]) -> None:
     _, _, without = take(3, {})
-    _, _, found = take(3, wrong)
-    change = {s: found[s] - without[s] for s in WHOLE}
+    _, _, trial = take(3, wrong)
+    change = {s: trial[s] - without[s] for s in WHOLE}
     for segment, angle in wrong.items():
         assert change[segment] == pytest.approx(-angle, abs=4.0)
     for segment in set(WHOLE) - set(wrong):
@@ -62,16 +62,16 @@ def test_a_wrong_forward_axis_is_found_by_its_size_and_sign(wrong: dict[Segment,
 @pytest.mark.sweep
 def test_a_good_calibration_is_left_nearly_as_it_is() -> None:
     for seed in (2, 3, 4):
-        _, _, found = take(seed, {})
-        assert max(abs(x) for x in found.values()) < 8.0
-        assert np.median(list(found.values())) == pytest.approx(0.0, abs=1e-9)
+        _, _, trial = take(seed, {})
+        assert max(abs(x) for x in trial.values()) < 8.0
+        assert np.median(list(trial.values())) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.sweep
 def test_after_turning_everybody_still_faces_ahead_at_rest() -> None:
-    calibrated, orientations, found = take(3, {"thigh_l": 25.0})
+    calibrated, orientations, trial = take(3, {"thigh_l": 25.0})
     calibrated, orientations = turn_forward_axes(
-        calibrated, orientations, {s: radians(x) for s, x in found.items()}
+        calibrated, orientations, {s: radians(x) for s, x in trial.items()}
     )
     zero = index_window(calibrated.calibration.zero, orientations.rate_hz)
     middle = (zero.start + zero.stop) // 2
@@ -95,22 +95,22 @@ def test_passes_are_repeated_until_a_large_error_is_gone() -> None:
     body, _ = nominal_body(calibrated.recording.subject.height_m)
     wrong, turned_wrong, _ = take(3, {"shank_r": -30.0})
     right, _, small = align_forward_axes(calibrated, orientations, body, WHOLE, ErkfParams.offline())
-    again, _, large = align_forward_axes(wrong, turned_wrong, body, WHOLE, ErkfParams.offline())
+    second, _, large = align_forward_axes(wrong, turned_wrong, body, WHOLE, ErkfParams.offline())
     assert degrees(small["shank_r"]) == pytest.approx(without["shank_r"], abs=0.5)
     assert degrees(large["shank_r"] - small["shank_r"]) == pytest.approx(30.0, abs=0.5)
     for segment in WHOLE:
-        mounts = (c.calibration.segments[segment].R_segment_sensor for c in (right, again))
+        mounts = (c.calibration.segments[segment].R_segment_sensor for c in (right, second))
         q, p = (from_matrix(m)[None] for m in mounts)
         assert degrees(float(angle_between(q, p)[0])) < 1.0, segment
 
 
 def test_what_was_turned_is_told_as_health() -> None:
-    told = {
+    notices = {
         f.of: f
         for f in judge_turned_axes({"pelvis": 0.0, "thigh_r": radians(-20.0), "foot_l": radians(170.0)})
     }
-    assert [told[s].verdict for s in ("pelvis", "thigh_r", "foot_l")] == ["good", "warn", "bad"]
-    assert told["thigh_r"].value == pytest.approx(20.0)
+    assert [notices[s].verdict for s in ("pelvis", "thigh_r", "foot_l")] == ["good", "warn", "bad"]
+    assert notices["thigh_r"].value == pytest.approx(20.0)
 
 
 @pytest.mark.sweep

@@ -1,4 +1,4 @@
-"""Parts of the ErKF's loop, as they are written: gate, noise, contacts, and states that are kept."""
+"""Parts of the ErKF loop, uncompiled: gate, noise, contacts, retained states."""
 
 from __future__ import annotations
 
@@ -85,10 +85,10 @@ def test_the_gate_is_the_normalised_square_of_the_velocity(b: int) -> None:
 
 
 def test_noise_follows_the_sample_and_what_it_lacks() -> None:
-    given, data, p, dt = memory(), samples((0, 0)), noise(), 0.01
-    before, P, Q = given.before.copy(), given.P.copy(), np.empty(30)
-    kernel.add_noise(given, data, 0, links(), p, Q)
-    jump = ((data.acc[0] - before[:, :3]) ** 2).sum(axis=1)
+    available, data, p, dt = memory(), samples((0, 0)), noise(), 0.01
+    initial_duplicate, P, Q = available.before.copy(), available.P.copy(), np.empty(30)
+    kernel.add_noise(available, data, 0, links(), p, Q)
+    jump = ((data.acc[0] - initial_duplicate[:, :3]) ** 2).sum(axis=1)
     for i, (sd_a, sd_w) in enumerate(links().sd):
         own = Q[15 * i : 15 * i + 15]
         assert own[:3] == pytest.approx(0.0)
@@ -96,8 +96,8 @@ def test_noise_follows_the_sample_and_what_it_lacks() -> None:
         assert own[6:9] == pytest.approx(sd_w**2 * dt**2)
         assert own[9:12] == pytest.approx(p.gyr_walk**2 * dt)
         assert own[12:15] == pytest.approx(p.acc_walk**2 * dt)
-    np.testing.assert_allclose(given.P, P + np.diag(Q))
-    assert given.before == pytest.approx(np.concatenate((data.acc[0], data.gyr[0]), axis=1))
+    np.testing.assert_allclose(available.P, P + np.diag(Q))
+    assert available.before == pytest.approx(np.concatenate((data.acc[0], data.gyr[0]), axis=1))
 
 
 def test_a_lost_sample_is_doubted_wholly_and_a_patched_one_more() -> None:
@@ -108,65 +108,65 @@ def test_a_lost_sample_is_doubted_wholly_and_a_patched_one_more() -> None:
     assert Q[[18, 21]] == pytest.approx([(0.2**2 + 9.0) * dt**2, (0.02**2 + 16.0) * dt**2])
 
 
-def judge(given: ErkfMemory, data: ErkfSamples, p: Noise) -> tuple[list[bool], list[bool], ErkfScratch]:
+def judge(inputs: ErkfMemory, data: ErkfSamples, p: Noise) -> tuple[list[bool], list[bool], ErkfScratch]:
     room, refused = scratch(), np.zeros(N, np.bool_)
-    kernel.judge_contacts(given, data, 0, p, room, np.zeros(len(given.P)), refused)
+    kernel.judge_contacts(inputs, data, 0, p, room, np.zeros(len(inputs.P)), refused)
     return room.taken.tolist(), refused.tolist(), room
 
 
 def test_only_a_foot_in_contact_is_held_still_and_what_is_too_fast_is_refused() -> None:
-    given = memory()
-    given.x[0, 3:6], given.x[1, 3:6] = 0.0, 1e3
+    available = memory()
+    available.x[0, 3:6], available.x[1, 3:6] = 0.0, 1e3
     p = noise(gate=9.0, reaccept=10)
-    assert judge(given, samples((CONTACT, CONTACT)), p)[:2] == ([True, False], [False, True])
-    assert given.refused.tolist() == [0, 1]
-    assert judge(given, samples((0, CONTACT)), p)[:2] == ([False, False], [False, True])
-    assert given.refused.tolist() == [0, 2]
-    assert judge(given, samples((0, 0)), p)[:2] == ([False, False], [False, False])
-    assert given.refused.tolist() == [0, 0]
-    assert judge(given, samples((CONTACT, CONTACT)), p._replace(gate=-1.0))[0] == [True, True]
-    assert judge(given, samples((CONTACT, CONTACT)), p._replace(zero_velocity=-1.0))[0] == [False, False]
+    assert judge(available, samples((CONTACT, CONTACT)), p)[:2] == ([True, False], [False, True])
+    assert available.refused.tolist() == [0, 1]
+    assert judge(available, samples((0, CONTACT)), p)[:2] == ([False, False], [False, True])
+    assert available.refused.tolist() == [0, 2]
+    assert judge(available, samples((0, 0)), p)[:2] == ([False, False], [False, False])
+    assert available.refused.tolist() == [0, 0]
+    assert judge(available, samples((CONTACT, CONTACT)), p._replace(gate=-1.0))[0] == [True, True]
+    assert judge(available, samples((CONTACT, CONTACT)), p._replace(zero_velocity=-1.0))[0] == [False, False]
 
 
 def test_after_long_refusal_it_is_taken_with_all_doubt() -> None:
-    given = memory()
-    given.x[0, 3:6], given.refused[0] = 100.0, 9
-    P, Q = given.P.copy(), np.zeros(30)
+    available = memory()
+    available.x[0, 3:6], available.refused[0] = 100.0, 9
+    P, Q = available.P.copy(), np.zeros(30)
     p, room, refused = noise(gate=9.0, reaccept=10, reaccept_m=2.0), scratch(), np.zeros(N, np.bool_)
-    kernel.judge_contacts(given, samples((CONTACT, 0)), 0, p, room, Q, refused)
+    kernel.judge_contacts(available, samples((CONTACT, 0)), 0, p, room, Q, refused)
     assert (room.taken.tolist(), refused.tolist()) == ([True, False], [True, False])
     assert Q[:3] == pytest.approx(4.0)
     assert Q[3:6] == pytest.approx(3e4)
     assert not Q[6:].any()
-    np.testing.assert_allclose(given.P, P + np.diag(Q))
+    np.testing.assert_allclose(available.P, P + np.diag(Q))
 
 
 def test_a_rolling_foot_is_believed_less() -> None:
-    given = memory()
+    available = memory()
     p = noise(zero_velocity=0.3, roll_m=0.2, gate=-1.0)
-    _, _, room = judge(given, samples((CONTACT, CONTACT), np.array([[2.0, 0.0]])), p)
+    _, _, room = judge(available, samples((CONTACT, CONTACT), np.array([[2.0, 0.0]])), p)
     assert room.zero_velocity == pytest.approx([0.5, 0.3])
 
 
 @pytest.mark.parametrize("states", [9, 15])
 def test_a_correction_moves_state_and_orientation(states: int) -> None:
-    given, room = memory(states), scratch()
-    x = given.x.copy()
-    given.x[:, 6:10] = [1.0, 0.0, 0.0, 0.0]
-    given.dx[:] = 0.0
-    given.dx[0:3], given.dx[3:6], given.dx[6:9] = 1.0, 2.0, (0.0, 0.0, 0.2)
+    available, room = memory(states), scratch()
+    x = available.x.copy()
+    available.x[:, 6:10] = [1.0, 0.0, 0.0, 0.0]
+    available.dx[:] = 0.0
+    available.dx[0:3], available.dx[3:6], available.dx[6:9] = 1.0, 2.0, (0.0, 0.0, 0.2)
     if states == 15:
-        given.dx[9:12], given.dx[12:15] = 3.0, 4.0
+        available.dx[9:12], available.dx[12:15] = 3.0, 4.0
     nominal, heading_sd = np.empty((N, 16)), np.empty(N)
-    kernel.inject(given, noise(m=states), room, nominal, heading_sd)
-    assert nominal == pytest.approx(given.x)
+    kernel.inject(available, noise(m=states), room, nominal, heading_sd)
+    assert nominal == pytest.approx(available.x)
     assert nominal[0, :6] - x[0, :6] == pytest.approx([1.0] * 3 + [2.0] * 3)
     assert nominal[0, 10:] - x[0, 10:] == pytest.approx([3.0] * 3 + [4.0] * 3 if states == 15 else 0.0)
     assert nominal[0, 6:10] == pytest.approx([np.cos(0.1), 0.0, 0.0, np.sin(0.1)])
     assert nominal[1, :6] == pytest.approx(x[1, :6])
     # the vertical is z of both sensors
-    at = [8, states + 8]
-    assert heading_sd == pytest.approx(np.sqrt(given.P[at, at]))
+    index = [8, states + 8]
+    assert heading_sd == pytest.approx(np.sqrt(available.P[index, index]))
 
 
 def test_joints_are_as_far_apart_as_their_two_ends() -> None:
@@ -187,17 +187,17 @@ def test_joints_are_as_far_apart_as_their_two_ends() -> None:
 
 
 def test_a_kept_state_comes_back_as_it_was() -> None:
-    given, other = memory(seed=1), memory(seed=2)
-    above = np.triu(other.P, 1)
+    available, other_memory = memory(seed=1), memory(seed=2)
+    triu = np.triu(other_memory.P, 1)
     row = np.full(row_length(N, 30) + 1, np.nan)
-    kernel.keep_state(given, row[:-1])
+    kernel.keep_state(available, row[:-1])
     assert np.isfinite(row[:-1]).all()
     assert np.isnan(row[-1])
-    kernel.restore_state(other, row)
+    kernel.restore_state(other_memory, row)
     for name in ("x", "before", "dx", "refused"):
-        np.testing.assert_array_equal(getattr(other, name), getattr(given, name))
-    np.testing.assert_array_equal(np.tril(other.P), np.tril(given.P))
-    np.testing.assert_array_equal(np.triu(other.P, 1), above)
+        np.testing.assert_array_equal(getattr(other_memory, name), getattr(available, name))
+    np.testing.assert_array_equal(np.tril(other_memory.P), np.tril(available.P))
+    np.testing.assert_array_equal(np.triu(other_memory.P, 1), triu)
 
 
 def test_a_part_of_the_output_is_a_view_of_it() -> None:

@@ -24,7 +24,7 @@ HOLD = round(HOLD_S * RATE)
 
 
 def signals(samples: int) -> SignalBlock:
-    """A foot that stands."""
+    """A foot in stance."""
     acc = np.tile([0.0, GRAVITY, 0.0], (samples, 1, 1))
     yes = np.ones((samples, 1), np.bool_)
     return SignalBlock(acc, np.zeros((samples, 1, 3)), yes, np.ones((samples, 1, 2), np.bool_), ~yes)
@@ -66,8 +66,8 @@ def test_any_division_into_blocks_gives_the_same_bits() -> None:
     assert np.isnan(expected[:, 0, 0]).any()
     live = start(whole.part(0, 100))
     edges = (0, 100, 101, 140, 150, 190, 240)
-    found = [live.push(whole.part(a, b))[0] for a, b in pairwise(edges)]
-    np.testing.assert_array_equal(np.concatenate(found), expected)
+    result = [live.push(whole.part(a, b))[0] for a, b in pairwise(edges)]
+    np.testing.assert_array_equal(np.concatenate(result), expected)
 
 
 def test_a_lost_foot_is_shown_until_the_hold_ends_and_again_from_its_next_rest_on() -> None:
@@ -110,8 +110,8 @@ def test_what_no_foot_does_breaks_it_for_good() -> None:
     assert live.broken
     assert np.isfinite(states[:10]).all()
     assert np.isnan(states[-1]).all()
-    again, _ = live.push(signals(5))
-    assert np.isnan(again).all()
+    second_frame, _ = live.push(signals(5))
+    assert np.isnan(second_frame).all()
     assert residual.shape == (20, 0)
 
 
@@ -129,9 +129,9 @@ def repeated(recording: UniformRecording, segment: Segment, start_s: float, end_
 
 
 def strides_of(take: UniformRecording, size: int = 10) -> list[LiveStride]:
-    """As they were told last, those whose values do not change any more."""
-    told = {s.n: s for f in stream(take, size)[1] for s in f.strides}
-    return [s for s in told.values() if s.complete]
+    """Last reported version of finished strides."""
+    by_n = {s.n: s for f in stream(take, size)[1] for s in f.strides}
+    return [s for s in by_n.values() if s.complete]
 
 
 @pytest.mark.slow
@@ -140,16 +140,16 @@ def test_a_path_that_its_rest_contradicts_begins_anew(start_s: float, length_s: 
     """Too short to be called a frozen sensor; all strides after it were half or three times as long."""
     take = only(cut(simulated("comfortable", 1)[0], 0.0, 22.0), "foot_l", "foot_r")
     whole = strides_of(take)
-    found = strides_of(repeated(take, "foot_l", start_s, start_s + length_s))
-    after = [s for s in found if s.start_s > start_s + STRIDE_S and s.counted]
-    assert {s.side for s in after} == {"left", "right"}
-    for s in found:
+    strides = strides_of(repeated(take, "foot_l", start_s, start_s + length_s))
+    final = [s for s in strides if s.start_s > start_s + STRIDE_S and s.counted]
+    assert {s.side for s in final} == {"left", "right"}
+    for s in strides:
         length = s.values["stride_length_m"]
         same = [x for x in whole if x.side == s.side and abs(x.end_s - s.end_s) < 0.1]
         if not s.counted or not same or same[0].values["stride_length_m"] is None:
             continue
         if length is None:
-            assert s not in after, (s.side, s.end_s, s.reasons["stride_length_m"])
+            assert s not in final, (s.side, s.end_s, s.reasons["stride_length_m"])
         else:
             assert length == pytest.approx(same[0].values["stride_length_m"], abs=0.1), (s.side, s.end_s)
 

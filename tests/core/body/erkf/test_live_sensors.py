@@ -1,4 +1,4 @@
-"""Sensors of a live take: which columns, what is taken off them, and the paths of the feet."""
+"""Sensors of a live trial: columns, bias removal, foot paths."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def feet() -> FilteredSensors:
 
 def test_feet_that_stand_are_at_rest_level_and_below_the_hips() -> None:
     paths = FootPaths(feet())
-    found = [paths.push(stand(n, *WORN)) for n in (100, 30)]
-    for block in found:
+    frames = [paths.push(stand(n, *WORN)) for n in (100, 30)]
+    for block in frames:
         assert block.valid.all()
         assert block.q == pytest.approx(np.broadcast_to(NEUTRAL, block.q.shape), abs=1e-9)
-    assert found[1].still.all()
-    left, right = found[1].p[-1]
+    assert frames[1].still.all()
+    left, right = frames[1].p[-1]
     assert left[1] - right[1] == pytest.approx(BODY.hip_width, abs=1e-6)
     assert left[2] == pytest.approx(right[2])
     assert not paths.broken
@@ -65,11 +65,11 @@ def test_more_than_one_lost_packet_in_a_row_is_a_patch_from_the_second_on_while_
         moved.gyr[:30, 2, 2] += 2.0
         moved.filled[[5, 10, 11, 20, 21, 22, 23, 50, 51, 52], 2] = True
         cuts = (slice(k, k + size) for k in range(0, 60, size))
-        found = [
+        patcheds = [
             paths.push(MeasuredBlock(moved.acc[k], moved.gyr[k], moved.valid[k], {}, moved.filled[k])).patched
             for k in cuts
         ]
-        parts.append(np.argwhere(np.concatenate(found)).tolist())
+        parts.append(np.argwhere(np.concatenate(patcheds)).tolist())
     assert parts[0] == parts[1] == [[k, 0] for k in (11, 21, 22, 23)]
 
 
@@ -83,7 +83,7 @@ def test_a_lost_foot_has_no_path_and_a_mad_one_breaks_them() -> None:
     mad.acc[:] = 1e14
     paths.push(mad)
     # the next rest shows it
-    after = paths.push(stand(200, *WORN))
+    final_frame = paths.push(stand(200, *WORN))
     assert paths.broken
-    assert not after.valid[-1].any()
+    assert not final_frame.valid[-1].any()
     assert not paths.push(stand(5, *WORN)).valid.any()

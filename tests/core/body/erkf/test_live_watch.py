@@ -1,4 +1,4 @@
-"""The two ends of a joint watched while samples come: told once, after a window of movement."""
+"""Live joint residuals: one notice, after a window of movement."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def test_a_joint_whose_ends_are_apart_is_told_once_a_window_is_full() -> None:
     )
     assert "28 mm apart" in notice.message
     assert push(watch, WINDOW, 5.0 * FAR_M) == []
-    (other,) = push(watch, WINDOW, 0.0, 2.0 * FAR_M)
-    assert other.sensor == "foot_l"
-    assert "50 mm apart" in other.message
+    (other_frame,) = push(watch, WINDOW, 0.0, 2.0 * FAR_M)
+    assert other_frame.sensor == "foot_l"
+    assert "50 mm apart" in other_frame.message
 
 
 def test_the_mean_of_the_squares_decides() -> None:

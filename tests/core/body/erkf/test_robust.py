@@ -1,4 +1,4 @@
-"""The ErKF against what may not matter, what goes wrong in a take, and set-ups that cannot work."""
+"""ErKF invariances, faults within a trial, and impossible set-ups."""
 
 from __future__ import annotations
 
@@ -30,22 +30,24 @@ LIVE, OFFLINE = ErkfParams.live(), ErkfParams.offline()
 
 def shuffled(take: Take, order: list[int]) -> Take:
     """Sensors and joints in another order."""
-    t, x, at = take.tree, take.inputs, {old: new for new, old in enumerate(order)}
-    joints = tuple(replace(j, proximal=at[j.proximal], distal=at[j.distal]) for j in reversed(t.joints))
+    t, x, position = take.tree, take.inputs, {old: new for new, old in enumerate(order)}
+    joints = tuple(
+        replace(j, proximal=position[j.proximal], distal=position[j.distal]) for j in reversed(t.joints)
+    )
     tree = ImuTree(
-        tuple(t.imus[i] for i in order), joints, tuple(at[i] for i in t.feet),
+        tuple(t.imus[i] for i in order), joints, tuple(position[i] for i in t.feet),
         t.q_mount[order], t.place[order], t.origin[order],
     )  # fmt: skip
     flags = (x.valid[:, order], x.contact[:, order], x.still[:, order])
     return replace(take, tree=tree, inputs=ErkfInputs(x.step_s, x.acc[:, order], x.gyr[:, order], *flags))
 
 
-def remounted(take: Take, by: Floats) -> Take:
+def remounted(take: Take, key: Floats) -> Take:
     """Every sensor turned on its segment by a rotation (n, 4)."""
     t, x = take.tree, take.inputs
 
     def end(i: int, r: Floats) -> Floats:
-        return np.asarray(rotate(by[i], r))
+        return np.asarray(rotate(key[i], r))
 
     joints = [
         replace(
@@ -57,27 +59,27 @@ def remounted(take: Take, by: Floats) -> Take:
         )
         for j in t.joints
     ]
-    tree = replace(t, joints=tuple(joints), q_mount=multiply(t.q_mount, conjugate(by)))
-    return replace(take, tree=tree, inputs=replace(x, acc=rotate(by, x.acc), gyr=rotate(by, x.gyr)))
+    tree = replace(t, joints=tuple(joints), q_mount=multiply(t.q_mount, conjugate(key)))
+    return replace(take, tree=tree, inputs=replace(x, acc=rotate(key, x.acc), gyr=rotate(key, x.gyr)))
 
 
 @pytest.mark.slow
 def test_the_order_of_sensors_and_joints_does_not_matter() -> None:
     take = mixed_walk()
     order = [4, 0, 6, 2, 1, 5, 3]
-    one, other = filtered(take, OFFLINE), filtered(shuffled(take, order), OFFLINE)
-    np.testing.assert_allclose(other.nominal, one.nominal[:, order], atol=1e-10)
-    assert np.array_equal(other.refused, one.refused[:, order])
+    one, second = filtered(take, OFFLINE), filtered(shuffled(take, order), OFFLINE)
+    np.testing.assert_allclose(second.nominal, one.nominal[:, order], atol=1e-10)
+    assert np.array_equal(second.refused, one.refused[:, order])
 
 
 def test_how_a_sensor_is_turned_on_its_segment_does_not_matter() -> None:
     take = mixed_walk()
-    by = normalise(np.random.default_rng(7).normal(size=(len(SEGMENTS), 4)))
-    again = remounted(take, by)
+    by_key = normalise(np.random.default_rng(7).normal(size=(len(SEGMENTS), 4)))
+    repeat = remounted(take, by_key)
     params = replace(OFFLINE, joint_axis_sd=0.2)
-    one, other = filtered(take, params), filtered(again, params)
-    np.testing.assert_allclose(other.p, one.p, atol=1e-10)
-    a, b = take.tree.segment_q(one.q), again.tree.segment_q(other.q)
+    one, second = filtered(take, params), filtered(repeat, params)
+    np.testing.assert_allclose(second.p, one.p, atol=1e-10)
+    a, b = take.tree.segment_q(one.q), repeat.tree.segment_q(second.q)
     assert np.abs(np.abs(np.sum(a * b, axis=-1)) - 1.0).max() < 1e-12
 
 
@@ -107,18 +109,20 @@ def test_samples_that_all_sensors_lack_are_stepped_over_by_their_time() -> None:
     """A tenth of the instants taken out: the step's own Δt counts, not the rate
     (docs/science/erkf.md, "Prediction")."""
     take, rng, x = mixed_walk(), np.random.default_rng(4), mixed_walk().inputs
-    kept = np.flatnonzero((rng.random(len(x.step_s)) > 0.1) | (np.arange(len(x.step_s)) < 500))
-    step = np.diff(np.cumsum(x.step_s)[kept], prepend=0.0)
+    stored_indices = np.flatnonzero((rng.random(len(x.step_s)) > 0.1) | (np.arange(len(x.step_s)) < 500))
+    step = np.diff(np.cumsum(x.step_s)[stored_indices], prepend=0.0)
     assert step.max() > 0.025
-    flags = (x.valid[kept], x.contact[kept], x.still[kept])
+    flags = (x.valid[stored_indices], x.contact[stored_indices], x.still[stored_indices])
 
     def against_pelvis(q: Floats) -> Floats:
         return np.asarray(multiply(conjugate(q[:, :1]), q))
 
     def off_deg(step_s: Floats) -> float:
-        thinned = replace(take, inputs=ErkfInputs(step_s, x.acc[kept], x.gyr[kept], *flags))
-        found, whole = (take.tree.segment_q(t.q) for t in (filtered(thinned, LIVE), filtered(take, LIVE)))
-        same = np.abs(np.sum(against_pelvis(found) * against_pelvis(whole[kept]), axis=-1))
+        thinned = replace(
+            take, inputs=ErkfInputs(step_s, x.acc[stored_indices], x.gyr[stored_indices], *flags)
+        )
+        result, whole = (take.tree.segment_q(t.q) for t in (filtered(thinned, LIVE), filtered(take, LIVE)))
+        same = np.abs(np.sum(against_pelvis(result) * against_pelvis(whole[stored_indices]), axis=-1))
         return float(np.degrees(np.sqrt(np.mean((2.0 * np.arccos(np.clip(same[1000:], 0.0, 1.0))) ** 2))))
 
     assert off_deg(step) < 1.0
@@ -151,9 +155,9 @@ def test_contacts_that_begin_early_and_end_late_shorten_strides_by_millimetres(
     for i in take.tree.feet:
         contact[:, i] = np.convolve(contact[:, i], np.ones(2 * wider + 1), "same") > 0.0
     spoilt = replace(take, inputs=replace(take.inputs, contact=contact))
-    found = stride_errors_m(spoilt, filtered(spoilt, LIVE))
-    assert abs(found.mean()) < most_m
-    assert np.sqrt(np.mean(found**2)) < 1.2 * most_m
+    result = stride_errors_m(spoilt, filtered(spoilt, LIVE))
+    assert abs(result.mean()) < most_m
+    assert np.sqrt(np.mean(result**2)) < 1.2 * most_m
 
 
 @pytest.mark.slow

@@ -48,13 +48,13 @@ def apart_deg(take: Take, track: ErkfTrack) -> Floats:
 def relative_sd_deg(state: ErkfState, m: int) -> Floats:
     """What the filter gives as uncertainty of each joint's relative heading."""
     up = to_matrix(state.nominal[:, 6:10])[:, 2]
-    found = []
+    result = []
     for joint in mixed_walk().tree.joints:
         row = np.zeros(len(state.P))
         for i, sign in ((joint.proximal, 1.0), (joint.distal, -1.0)):
             row[i * m + 6 : i * m + 9] = sign * up[i]
-        found.append(degrees(float(np.sqrt(row @ state.P @ row))))
-    return np.array(found)
+        result.append(degrees(float(np.sqrt(row @ state.P @ row))))
+    return np.array(result)
 
 
 @cache
@@ -73,8 +73,8 @@ def test_standing_tells_nothing_of_headings(params: ErkfParams) -> None:
     move. Positions and orientations taken as independent at the start gave 18° in place of 42°."""
     take = mixed_walk()
     first = turned_start(alternately(60.0), params)
-    after = filter_block(first, take.inputs.part(0, 500), take.tree, params)[1]
-    before_deg, after_deg = relative_sd_deg(first, params.states), relative_sd_deg(after, params.states)
+    final_block = filter_block(first, take.inputs.part(0, 500), take.tree, params)[1]
+    before_deg, after_deg = relative_sd_deg(first, params.states), relative_sd_deg(final_block, params.states)
     np.testing.assert_allclose(before_deg, degrees(np.sqrt(2.0) * params.start_heading_sd), rtol=0.01)
     assert (after_deg > 0.9 * before_deg).all()
 
@@ -93,8 +93,8 @@ def test_the_heading_that_all_have_in_common_is_taken_as_known() -> None:
     measured = replace(take.inputs, heading=np.full(take.inputs.valid.shape, np.nan))
     assert common_sd_deg(free) < 0.5
     assert common_sd_deg(start_state(take.tree, measured, LIVE, take.rest)) > 10.0, "a magnetometer tells it"
-    after = filter_block(free, take.inputs, take.tree, LIVE)[1]
-    assert common_sd_deg(after) > common_sd_deg(free), "and it is not learned on the way"
+    final_block = filter_block(free, take.inputs, take.tree, LIVE)[1]
+    assert common_sd_deg(final_block) > common_sd_deg(free), "and it is not learned on the way"
 
 
 def test_a_common_turn_of_the_start_changes_no_joint_angle() -> None:
@@ -107,13 +107,13 @@ def test_a_common_turn_of_the_start_changes_no_joint_angle() -> None:
     P = first.P.copy()
     spin = to_matrix(turn)
     for i in range(len(SEGMENTS)):
-        for at in (0, 3):
-            k = slice(i * 9 + at, i * 9 + at + 3)
+        for position in (0, 3):
+            k = slice(i * 9 + position, i * 9 + position + 3)
             P[k] = spin @ P[k]
             P[:, k] = P[:, k] @ spin.T
     one = filter_block(first, take.inputs, take.tree, LIVE)[0]
-    other = filter_block(replace(first, nominal=nominal, P=P), take.inputs, take.tree, LIVE)[0]
-    a, b = angles_of(take, one), angles_of(take, other)
+    other_block = filter_block(replace(first, nominal=nominal, P=P), take.inputs, take.tree, LIVE)[0]
+    a, b = angles_of(take, one), angles_of(take, other_block)
     for name in a:
         if not name.startswith("pelvis"):
             assert np.degrees(np.abs(a[name] - b[name]).max()) < 1e-6, name
@@ -153,9 +153,9 @@ def test_with_known_positions_they_come_together_at_the_first_step(
     nominal[:, 0:3] = [
         take.truth.p[s][0] + rotate(take.truth.q[s][0], take.tree.place[i]) for i, s in enumerate(SEGMENTS)
     ]
-    for at in range(0, len(P), 3):
-        k = slice(at, at + 3)
-        P[k, k] = start.P[k, k] if at % m else wide.start_position_sd**2 * np.eye(3)
+    for position in range(0, len(P), 3):
+        k = slice(position, position + 3)
+        P[k, k] = start.P[k, k] if position % m else wide.start_position_sd**2 * np.eye(3)
     first = replace(start, nominal=nominal, P=P)
     error = apart_deg(take, filter_block(first, take.inputs, take.tree, wide)[0])
     assert error[round((TOE_OFF_S + 0.6) * take.rate_hz) :].max() < 3.0
@@ -197,12 +197,12 @@ def test_a_start_that_was_off_is_told_with_its_size(angle: float) -> None:
     """The smoother's first heading against the one taken: right within 10°, even where poses are not."""
     run = smoothed(angle)
     health = erkf_health(run)
-    (found,) = [f for f in health if f.name == "start_heading_off_deg"]
-    assert found.value == pytest.approx(angle, abs=10.0)
+    (result,) = [f for f in health if f.name == "start_heading_off_deg"]
+    assert result.value == pytest.approx(angle, abs=10.0)
     warn, bad = START_HEADING_DEG
-    assert found.verdict == ("bad" if angle > bad else "warn" if angle > warn else "good")
-    told = [n for n in erkf_notices(run, health) if n.code == "start_heading_off"]
-    assert bool(told) == (angle > warn)
-    if told:
-        assert told[0].sensor == "foot_r"
-        assert f"{found.value:.0f}°" in told[0].message
+    assert result.verdict == ("bad" if angle > bad else "warn" if angle > warn else "good")
+    notices = [n for n in erkf_notices(run, health) if n.code == "start_heading_off"]
+    assert bool(notices) == (angle > warn)
+    if notices:
+        assert notices[0].sensor == "foot_r"
+        assert f"{result.value:.0f}°" in notices[0].message

@@ -48,12 +48,12 @@ def transition(F: Floats, m: int) -> Floats:
 
 @pytest.mark.parametrize("m", [9, 15])
 def test_the_adjoint_goes_back_by_the_transposed_steps(m: int) -> None:
-    kept, lam = record(m), np.random.default_rng(2).normal(0.0, 1.0, N * m)
+    retained, lam = record(m), np.random.default_rng(2).normal(0.0, 1.0, N * m)
     expected, swept = lam.copy(), np.empty((K, N * m))
-    sweep.sweep_back(lam, np.full(K, DT), kept, m, swept)
+    sweep.sweep_back(lam, np.full(K, DT), retained, m, swept)
     for k in range(K - 1, -1, -1):
         assert swept[k] == pytest.approx(expected)
-        expected = transition(kept.F[k], m).T @ expected
+        expected = transition(retained.F[k], m).T @ expected
     assert lam == pytest.approx(expected)
 
 
@@ -67,21 +67,21 @@ def test_only_the_lower_half_of_the_covariance_is_read() -> None:
 
 @pytest.mark.parametrize("m", [9, 15])
 def test_smoothed_states_are_the_filtered_ones_moved_by_what_came_later(m: int) -> None:
-    kept = record(m)
+    retained = record(m)
     rng = np.random.default_rng(5)
     swept, d = rng.normal(0.0, 0.1, (K, N * m)), rng.normal(0.0, 0.1, N * m)
     states = rng.normal(0.0, 1.0, (K, N, 16))
     states[..., 6:10] /= np.linalg.norm(states[..., 6:10], axis=-1, keepdims=True)
-    found, expected = states.copy(), d.copy()
-    sweep.move_smoothed(d, np.full(K, DT), kept, m, swept, found)
+    duplicate, expected = states.copy(), d.copy()
+    sweep.move_smoothed(d, np.full(K, DT), retained, m, swept, duplicate)
     for k in range(K):
-        expected = transition(kept.F[k], m) @ expected - kept.Q[k] * swept[k] - kept.dx[k]
+        expected = transition(retained.F[k], m) @ expected - retained.Q[k] * swept[k] - retained.dx[k]
         for i in range(N):
-            own, a = expected[i * m : (i + 1) * m], 0.5 * kept.dx[k][i * m + 6 : i * m + 9]
-            assert found[k, i, :6] - states[k, i, :6] == pytest.approx(own[:6])
+            own, a = expected[i * m : (i + 1) * m], 0.5 * retained.dx[k][i * m + 6 : i * m + 9]
+            assert duplicate[k, i, :6] - states[k, i, :6] == pytest.approx(own[:6])
             turn = own[6:9] - np.cross(a, own[6:9])
-            assert found[k, i, 6:10] == pytest.approx(multiply(states[k, i, 6:10], exp(turn)))
-            biases = found[k, i, 10:] - states[k, i, 10:]
+            assert duplicate[k, i, 6:10] == pytest.approx(multiply(states[k, i, 6:10], exp(turn)))
+            biases = duplicate[k, i, 10:] - states[k, i, 10:]
             assert biases == pytest.approx(own[9:] if m == 15 else np.zeros(6))
 
 

@@ -58,20 +58,20 @@ def mixed_walk(seed: int = 2) -> Take:
     return take_of(simulate(MIXED, seed=seed, setup=RecordingSetup()))
 
 
-def take_of(made: Simulation) -> Take:
+def take_of(result: Simulation) -> Take:
     """Inputs with the true mounts and places; gyroscope bias from the first standing."""
-    recording, truth = synchronise(made.recording), made.truth
+    recording, truth = synchronise(result.recording), result.truth
     mounts = {s: to_matrix(truth.mounts[s].q_segment_sensor) for s in SEGMENTS}
     places = {s: truth.mounts[s].position_m for s in SEGMENTS}
     tree = person_tree(truth.body, mounts, SEGMENTS, places)
-    rest = slice(*(round(t * recording.rate_hz) for t in truth.zero))
+    window = slice(*(round(t * recording.rate_hz) for t in truth.zero))
     acc, gyr = [], []
     for s in SEGMENTS:
         signals = recording.sensors[s]
-        up = signals.acc[rest].mean(axis=0)
+        up = signals.acc[window].mean(axis=0)
         norm = np.linalg.norm(up)
         acc.append(signals.acc - (norm - GRAVITY) * up / norm)
-        gyr.append(signals.gyr - signals.gyr[rest].mean(axis=0))
+        gyr.append(signals.gyr - signals.gyr[window].mean(axis=0))
     valid = np.stack([recording.sensors[s].valid for s in SEGMENTS], axis=1)
     inputs = erkf_inputs(tree, np.stack(acc, axis=1), np.stack(gyr, axis=1), valid, recording.rate_hz)
     return Take(tree, inputs, truth, recording.rate_hz)
@@ -94,14 +94,14 @@ def angles_of(take: Take, track: ErkfTrack, *, zeroed: bool = True) -> dict[str,
     q = {s: take.tree.segment_q(track.q)[:, i] for i, s in enumerate(SEGMENTS)}
     n = len(track.q)
     posed = Orientations(take.truth.t_s[:n], take.rate_hz, q, {s: np.ones(n, bool) for s in q}, "erkf")
-    found = measure_angles(posed, take.truth.zero)
-    return {n: x + (0.0 if zeroed else found.zero_offset[n]) for n, x in found.angles.items()}
+    angles = measure_angles(posed, take.truth.zero)
+    return {n: x + (0.0 if zeroed else angles.zero_offset[n]) for n, x in angles.angles.items()}
 
 
 def angle_errors_deg(take: Take, track: ErkfTrack) -> dict[str, float]:
     """RMS error of each angle in degrees."""
-    true, found = take.truth.subtract_standing(), angles_of(take, track)
-    return {n: float(np.degrees(np.sqrt(np.mean((a - true[n][: len(a)]) ** 2)))) for n, a in found.items()}
+    true, angles = take.truth.subtract_standing(), angles_of(take, track)
+    return {n: float(np.degrees(np.sqrt(np.mean((a - true[n][: len(a)]) ** 2)))) for n, a in angles.items()}
 
 
 def stride_errors_m(take: Take, track: ErkfTrack) -> Floats:

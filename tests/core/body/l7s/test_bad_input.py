@@ -43,9 +43,9 @@ def take(estimator: Estimator, name: str = "fast_with_turns") -> UniformRecordin
 
 
 def run(recording: UniformRecording, estimator: Estimator) -> PoseEstimate:
-    made = estimated(recording, PoseParams(estimator=estimator))
-    assert made.poses.method == estimator
-    return made
+    estimate = estimated(recording, PoseParams(estimator=estimator))
+    assert estimate.poses.method == estimator
+    return estimate
 
 
 @cache
@@ -54,13 +54,13 @@ def right(estimator: Estimator, name: str = "fast_with_turns") -> PoseEstimate:
     return run(take(estimator, name), estimator)
 
 
-def codes(made: PoseEstimate) -> set[str]:
-    return {n.code for n in made.poses.notices}
+def codes(result: PoseEstimate) -> set[str]:
+    return {n.code for n in result.poses.notices}
 
 
-def finding(made: PoseEstimate, name: str, of: str | None = None) -> tuple[float, Verdict]:
-    (found,) = (f for f in made.poses.health if (f.name, f.of) == (name, of))
-    return found.value, found.verdict
+def finding(recording: PoseEstimate, name: str, source: str | None = None) -> tuple[float, Verdict]:
+    (result,) = (f for f in recording.poses.health if (f.name, f.of) == (name, source))
+    return result.value, result.verdict
 
 
 def wearing(recording: UniformRecording, **sensors: SensorSignals) -> UniformRecording:
@@ -83,9 +83,9 @@ ACCUSING = {
     ]),
 )  # fmt: skip
 def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimator) -> None:
-    made = run(only(simulated(name, seed)[0], *SEEN[estimator]), estimator)
-    assert not codes(made) & ACCUSING
-    assert all(f.verdict == "good" for f in made.poses.health)
+    result = run(only(simulated(name, seed)[0], *SEEN[estimator]), estimator)
+    assert not codes(result) & ACCUSING
+    assert all(f.verdict == "good" for f in result.poses.health)
 
 
 @pytest.mark.sweep
@@ -93,9 +93,9 @@ def test_a_right_set_up_is_not_accused(name: str, seed: int, estimator: Estimato
 def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
     recording = take("l7s_3i", name)
     s = recording.sensors
-    made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_3i")
-    assert "feet_exchanged" in codes(made)
-    as_worn, wrong = (finding(m, "toward_foot_mps2") for m in (right("l7s_3i", name), made))
+    result = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_3i")
+    assert "feet_exchanged" in codes(result)
+    as_worn, wrong = (finding(m, "toward_foot_mps2") for m in (right("l7s_3i", name), result))
     assert wrong[1] == "bad"
     assert as_worn[0] < 0.0 < wrong[0]
 
@@ -104,11 +104,11 @@ def test_exchanged_feet_show_in_where_the_pelvis_falls(name: str) -> None:
 def test_without_a_pelvis_exchanged_feet_shift_what_turns_show_and_nothing_is_said_below_the_limit() -> None:
     recording = take("l7s_2i")
     s = recording.sensors
-    made = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_2i")
-    assert "feet_exchanged" not in codes(made)
-    assert finding(made, "inner_foot_m")[0] > 0.0
-    (told,) = list_health_notices([HealthFinding("inner_foot_m", None, 0.2, *INNER_M)])
-    assert told.code == "feet_exchanged"
+    result = run(wearing(recording, foot_l=s["foot_r"], foot_r=s["foot_l"]), "l7s_2i")
+    assert "feet_exchanged" not in codes(result)
+    assert finding(result, "inner_foot_m")[0] > 0.0
+    (notices,) = list_health_notices([HealthFinding("inner_foot_m", None, 0.2, *INNER_M)])
+    assert notices.code == "feet_exchanged"
     # minus the distance of the feet across the way
     assert -0.2 < finding(right("l7s_2i"), "inner_foot_m")[0] < -0.05
 
@@ -125,9 +125,9 @@ def test_without_turn_and_pelvis_sides_are_not_measured() -> None:
 @pytest.mark.parametrize("estimator", BOTH)
 def test_one_sensor_given_for_both_feet_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
-    made = run(wearing(recording, foot_r=recording.sensors["foot_l"]), estimator)
-    assert "feet_out_of_step" in codes(made)
-    value, verdict = finding(made, "phase_off_pct")
+    result = run(wearing(recording, foot_r=recording.sensors["foot_l"]), estimator)
+    assert "feet_out_of_step" in codes(result)
+    value, verdict = finding(result, "phase_off_pct")
     assert (round(value), verdict) == (50, "bad")
 
 
@@ -137,9 +137,9 @@ def test_a_foot_with_a_late_clock_is_told(estimator: Estimator) -> None:
     recording = take(estimator)
     was = recording.sensors["foot_l"]
     late = replace(was, acc=np.roll(was.acc, 20, axis=0).copy(), gyr=np.roll(was.gyr, 20, axis=0).copy())
-    made = run(wearing(recording, foot_l=late), estimator)
-    assert "feet_out_of_step" in codes(made)
-    value, verdict = finding(made, "phase_off_pct")
+    result = run(wearing(recording, foot_l=late), estimator)
+    assert "feet_out_of_step" in codes(result)
+    value, verdict = finding(result, "phase_off_pct")
     # 0.2 s of a stride of 0.94 s
     assert value == pytest.approx(21.0, abs=3.0)
     assert verdict == "warn"
@@ -147,26 +147,26 @@ def test_a_foot_with_a_late_clock_is_told(estimator: Estimator) -> None:
 
 def test_a_sensor_taken_for_the_pelvis_that_sits_on_a_thigh_is_told() -> None:
     thigh = simulated("fast_with_turns", 3)[0].sensors["thigh_r"]
-    made = run(wearing(take("l7s_3i"), pelvis=thigh), "l7s_3i")
-    assert "not_a_pelvis" in codes(made)
-    assert finding(made, "pelvis_tilt_sd_deg")[1] == "bad"
+    result = run(wearing(take("l7s_3i"), pelvis=thigh), "l7s_3i")
+    assert "not_a_pelvis" in codes(result)
+    assert finding(result, "pelvis_tilt_sd_deg")[1] == "bad"
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_sensor_taken_for_a_foot_that_sits_on_the_shank_is_told(estimator: Estimator) -> None:
     shank = simulated("fast_with_turns", 3)[0].sensors["shank_l"]
-    made = run(wearing(take(estimator), foot_l=shank), estimator)
-    assert "foot_never_still" in codes(made)
-    assert finding(made, "longest_moving_s", "foot_l")[1] == "bad"
+    result = run(wearing(take(estimator), foot_l=shank), estimator)
+    assert "foot_never_still" in codes(result)
+    assert finding(result, "longest_moving_s", "foot_l")[1] == "bad"
 
 
 def test_pelvis_and_foot_exchanged_are_told() -> None:
     recording = take("l7s_3i")
     s = recording.sensors
-    made = run(wearing(recording, pelvis=s["foot_l"], foot_l=s["pelvis"]), "l7s_3i")
-    assert codes(made) >= {"not_a_pelvis", "feet_drift_apart"}
-    assert finding(made, "feet_out_of_place_pct")[1] == "bad"
+    result = run(wearing(recording, pelvis=s["foot_l"], foot_l=s["pelvis"]), "l7s_3i")
+    assert codes(result) >= {"not_a_pelvis", "feet_drift_apart"}
+    assert finding(result, "feet_out_of_place_pct")[1] == "bad"
 
 
 @pytest.mark.sweep
@@ -175,9 +175,9 @@ def test_calibration_finds_forward_of_a_foot_sensor_put_on_backwards(estimator: 
     recording, half = take(estimator), about(2, np.pi)
     was = recording.sensors["foot_l"]
     backwards = replace(was, acc=rotate(half, was.acc), gyr=rotate(half, was.gyr), mag=None)
-    made, whole = run(wearing(recording, foot_l=backwards), estimator), right(estimator)
+    result, whole = run(wearing(recording, foot_l=backwards), estimator), right(estimator)
     for segment, p in whole.poses.p.items():
-        np.testing.assert_allclose(made.poses.p[segment], p, atol=1e-3)
+        np.testing.assert_allclose(result.poses.p[segment], p, atol=1e-3)
 
 
 @pytest.mark.parametrize("estimator", BOTH)
@@ -210,36 +210,36 @@ def test_feet_whose_headings_disagree_are_told(
     moved: dict[Segment, SampleSeries] = {**acceleration, "foot_l": rotate(turn, acceleration["foot_l"][:])}
     body = simulated("fast_with_turns", 3)[1].body
     poses = l7s_poses(replace(orientations, q=q), moved, still_feet(calibrated), body)
-    (found,) = (f for f in poses.health if f.name == "feet_out_of_place_pct")
-    assert found.verdict == verdict
+    (result,) = (f for f in poses.health if f.name == "feet_out_of_place_pct")
+    assert result.verdict == verdict
     assert ("feet_drift_apart" in {n.code for n in poses.notices}) == (verdict != "good")
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_gap_of_half_a_second_of_a_foot_is_told_and_the_rest_stays_finite(estimator: Estimator) -> None:
-    made = run(lost(take(estimator), "foot_l", 20.0, 20.5), estimator)
-    assert "gap_not_bridged" in codes(made)
-    value, verdict = finding(made, "gap_s", "foot_l")
+    result = run(lost(take(estimator), "foot_l", 20.0, 20.5), estimator)
+    assert "gap_not_bridged" in codes(result)
+    value, verdict = finding(result, "gap_s", "foot_l")
     assert (round(value, 2), verdict) == (0.5, "bad")
-    for p in made.poses.p.values():
+    for p in result.poses.p.values():
         assert np.isfinite(p).all()
-    valid, rests = made.poses.valid, made.poses.contact["foot_l"]
-    again = 2050 + int(np.argmax(rests[2050:]))
-    assert not valid[2000:again].any(), "until the foot rests nobody knows where it went"
-    assert valid[again]
-    assert again < 2150
+    valid, rests = result.poses.valid, result.poses.contact["foot_l"]
+    second = 2050 + int(np.argmax(rests[2050:]))
+    assert not valid[2000:second].any(), "until the foot rests nobody knows where it went"
+    assert valid[second]
+    assert second < 2150
 
 
 @pytest.mark.sweep
 def test_a_gap_of_the_pelvis_is_bridged_by_the_feet() -> None:
     whole = right("l7s_3i")
-    made = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
-    assert "gap_not_bridged" not in codes(made)
-    assert finding(made, "gap_s", "pelvis")[1] == "good"
-    after = slice(2300, 4000)
+    result = run(lost(take("l7s_3i"), "pelvis", 20.0, 20.5), "l7s_3i")
+    assert "gap_not_bridged" not in codes(result)
+    assert finding(result, "gap_s", "pelvis")[1] == "good"
+    final_window = slice(2300, 4000)
     for side in SIDES:
-        apart = made.poses.p[FOOT[side]][after] - whole.poses.p[FOOT[side]][after]
+        apart = result.poses.p[FOOT[side]][final_window] - whole.poses.p[FOOT[side]][final_window]
         assert np.abs(apart - apart.mean(axis=0)).max() < 0.1
 
 
@@ -249,21 +249,22 @@ def test_a_loss_that_nobody_noticed_is_told_by_what_does_not_fit(estimator: Esti
     recording = take(estimator)
     held = lost(recording, "foot_l", 20.0, 20.5).sensors["foot_l"]
     unnoticed = replace(held, valid=recording.sensors["foot_l"].valid)
-    made = run(wearing(recording, foot_l=unnoticed), estimator)
-    assert codes(made) & {"legs_do_not_fit", "zero_velocity_refused"}
+    result = run(wearing(recording, foot_l=unnoticed), estimator)
+    assert codes(result) & {"legs_do_not_fit", "zero_velocity_refused"}
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_burst_of_no_numbers_is_a_gap(estimator: Estimator) -> None:
-    made = simulate_scenario("fast_with_turns", 3, worn=SEEN[estimator])
-    device = next(d for d, s in made.recording.segments.items() if s == "foot_r")
-    stream = made.recording.streams[device]
+    simulation = simulate_scenario("fast_with_turns", 3, worn=SEEN[estimator])
+    device = next(d for d, s in simulation.recording.segments.items() if s == "foot_r")
+    stream = simulation.recording.streams[device]
     assert stream.gyr is not None
     acc, gyr = stream.acc.copy(), stream.gyr.copy()
     acc[2000:2040], gyr[2000:2040] = np.nan, np.nan
     broken: Recording = replace(
-        made.recording, streams={**made.recording.streams, device: replace(stream, acc=acc, gyr=gyr)}
+        simulation.recording,
+        streams={**simulation.recording.streams, device: replace(stream, acc=acc, gyr=gyr)},
     )
     done = analyse(broken, PipelineConfig(poses=PoseParams(estimator=estimator)))
     assert done.problem is None
@@ -293,27 +294,27 @@ def test_a_number_that_is_none_inside_a_valid_sample_is_refused() -> None:
 @pytest.mark.parametrize("missing", ["pelvis", "foot_l", "foot_r"])
 def test_a_missing_sensor_is_named(missing: Segment) -> None:
     recording = take("l7s_3i")
-    kept = only(recording, *(s for s in PELVIS_FEET if s != missing))
-    with pytest.raises(EstimationError) as asked:
-        estimated(kept, PoseParams(estimator="l7s_3i"))
-    assert asked.value.code == "estimator_impossible"
+    retained = only(recording, *(s for s in PELVIS_FEET if s != missing))
+    with pytest.raises(EstimationError) as requested_error:
+        estimated(retained, PoseParams(estimator="l7s_3i"))
+    assert requested_error.value.code == "estimator_impossible"
     calibrated = calibrate(recording)
     orientations = estimate_orientations(calibrated)
     without = replace(orientations, q={s: q for s, q in orientations.q.items() if s != missing})
-    with pytest.raises(EstimationError) as given:
+    with pytest.raises(EstimationError) as settings:
         l7s_poses(
             without,
             free_acceleration(calibrated, without),
             still_feet(calibrated),
             BodyModel.from_height(1.75),
-            worn="3I",
+            configuration="3I",
         )
-    assert (given.value.code, given.value.sensor) == ("sensor_missing", missing)
+    assert (settings.value.code, settings.value.sensor) == ("sensor_missing", missing)
 
 
 def test_a_take_without_its_pelvis_is_done_with_the_feet() -> None:
-    made = estimated(only(take("l7s_3i"), *FEET))
-    assert made.poses.method == "l7s_2i"
+    estimate = estimated(only(take("l7s_3i"), *FEET))
+    assert estimate.poses.method == "l7s_2i"
 
 
 @pytest.mark.parametrize("name", ["hip_width", "thigh", "shank", "ankle_height", "foot"])
@@ -329,8 +330,8 @@ def test_a_length_that_no_leg_has_is_refused(name: str, length: float) -> None:
 @pytest.mark.parametrize("estimator", BOTH)
 def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) -> None:
     walking = take(estimator, "comfortable")
-    told = codes(run(cut(walking, 8.0, 40.0), estimator))
-    assert "started_moving" in told
+    notices = codes(run(cut(walking, 8.0, 40.0), estimator))
+    assert "started_moving" in notices
     with pytest.raises(SagittalError) as error:
         run(cut(walking, 8.0, 24.0), estimator)
     assert isinstance(error.value, EstimationError)
@@ -340,16 +341,16 @@ def test_without_standing_there_is_an_error_or_a_notice(estimator: Estimator) ->
 @pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 def test_a_treadmill_is_told_because_its_signals_are_those_of_the_floor(estimator: Estimator) -> None:
-    made = run(replace(take(estimator), protocol="treadmill"), estimator)
-    assert "treadmill_belt" in codes(made)
+    result = run(replace(take(estimator), protocol="treadmill"), estimator)
+    assert "treadmill_belt" in codes(result)
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("estimator", BOTH)
 @pytest.mark.parametrize("protocol", sweep_after(1, ["squat", "activity", "tug"]))
 def test_a_protocol_in_which_the_pelvis_sinks_is_told(estimator: Estimator, protocol: str) -> None:
-    made = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
-    assert "pelvis_height_assumed" in codes(made)
+    result = run(replace(take(estimator), protocol=protocol), estimator)  # type: ignore[arg-type]
+    assert "pelvis_height_assumed" in codes(result)
 
 
 @pytest.mark.sweep
@@ -367,8 +368,8 @@ def test_a_squat_that_no_protocol_announced_is_told(depth_m: float, verdict: Ver
     poses = l7s_poses(orientations, acceleration, still_feet(calibrated), body)
     # L7S pulls the pelvis back to its height: of 30 cm it shows few
     assert body.thigh + body.shank + body.ankle_height - poses.p["pelvis"][200:500, 2].min() < 0.1
-    (found,) = (f for f in poses.health if f.name == "pelvis_rise_cm")
-    assert found.verdict == verdict
+    (result,) = (f for f in poses.health if f.name == "pelvis_rise_cm")
+    assert result.verdict == verdict
     assert ("pelvis_rises" in {n.code for n in poses.notices}) == (depth_m > 0.0)
 
 

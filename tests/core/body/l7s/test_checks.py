@@ -37,34 +37,34 @@ def walk(turn_per_s: float = 0.0, *, pelvis: bool = False) -> SeenWalk:
     return SeenWalk(step, forward, feet, np.zeros((N, 3)) if pelvis else None)
 
 
-def check(seen: SeenWalk) -> dict[str, float]:
-    return walking_checks(seen, MODEL, RATE)
+def check(observations: SeenWalk) -> dict[str, float]:
+    return walking_checks(observations, MODEL, RATE)
 
 
-def exchanged(seen: SeenWalk) -> SeenWalk:
-    return replace(seen, step=seen.step[:, ::-1], feet=seen.feet[:, ::-1])
+def exchanged(observations: SeenWalk) -> SeenWalk:
+    return replace(observations, step=observations.step[:, ::-1], feet=observations.feet[:, ::-1])
 
 
 def test_a_straight_walk_has_its_feet_in_place_and_in_turn() -> None:
-    found = check(walk())
-    assert found["out_of_place_share"] == 0.0
-    assert found["phase_off"] == pytest.approx(0.0, abs=0.02)
-    assert found["turned_rad"] == pytest.approx(0.0, abs=1e-9)
-    assert "inner_foot_m" not in found
+    result = check(walk())
+    assert result["out_of_place_share"] == 0.0
+    assert result["phase_off"] == pytest.approx(0.0, abs=0.02)
+    assert result["turned_rad"] == pytest.approx(0.0, abs=1e-9)
+    assert "inner_foot_m" not in result
 
 
 @pytest.mark.parametrize(("widths", "share"), [(1.9, 0.0), (2.1, 1.0), (-0.4, 0.0), (-0.6, 1.0)])
 def test_feet_are_out_of_place_beyond_twice_the_hips_or_crossed(widths: float, share: float) -> None:
-    seen = walk()
-    seen.feet[:, 0, 1], seen.feet[:, 1, 1] = widths * WIDTH, 0.0
-    assert check(seen)["out_of_place_share"] == share
+    observations = walk()
+    observations.feet[:, 0, 1], observations.feet[:, 1, 1] = widths * WIDTH, 0.0
+    assert check(observations)["out_of_place_share"] == share
 
 
 def test_only_time_in_motion_counts() -> None:
-    seen = walk()
-    seen.feet[: N // 2, 0, 1] = 5.0
-    seen.step[: N // 4] = True
-    assert check(seen)["out_of_place_share"] == pytest.approx(1.0 / 3.0)
+    observations = walk()
+    observations.feet[: N // 2, 0, 1] = 5.0
+    observations.step[: N // 4] = True
+    assert check(observations)["out_of_place_share"] == pytest.approx(1.0 / 3.0)
 
 
 def test_a_foot_that_rests_late_or_never_is_out_of_phase() -> None:
@@ -87,65 +87,65 @@ def test_few_strides_and_slow_ones_say_nothing_of_phases() -> None:
 
 @pytest.mark.parametrize("turn_per_s", [0.5, -0.5])
 def test_the_inner_foot_goes_less_far_by_the_distance_of_the_feet(turn_per_s: float) -> None:
-    seen = walk(turn_per_s)
-    found = check(seen)
-    assert found["inner_foot_m"] == pytest.approx(-WIDTH, rel=0.05)
-    assert found["turned_rad"] == pytest.approx(0.5 * np.sqrt(STRIDES - 2), rel=0.15)
-    assert check(exchanged(seen))["inner_foot_m"] == pytest.approx(WIDTH, rel=0.05)
+    observations = walk(turn_per_s)
+    result = check(observations)
+    assert result["inner_foot_m"] == pytest.approx(-WIDTH, rel=0.05)
+    assert result["turned_rad"] == pytest.approx(0.5 * np.sqrt(STRIDES - 2), rel=0.15)
+    assert check(exchanged(observations))["inner_foot_m"] == pytest.approx(WIDTH, rel=0.05)
 
 
 def test_too_little_turning_says_nothing_of_sides() -> None:
-    found = check(walk(0.3))
-    assert 0.0 < found["turned_rad"] < np.radians(60.0)
-    assert "inner_foot_m" not in found
-    alone = walk(0.5)
-    alone.step[:, 1] = False
-    assert not {"turned_rad", "inner_foot_m"} & set(check(alone))
+    result = check(walk(0.3))
+    assert 0.0 < result["turned_rad"] < np.radians(60.0)
+    assert "inner_foot_m" not in result
+    single_walk = walk(0.5)
+    single_walk.step[:, 1] = False
+    assert not {"turned_rad", "inner_foot_m"} & set(check(single_walk))
 
 
 def test_the_pelvis_falls_away_from_the_foot_it_stands_on() -> None:
-    seen = walk(pelvis=True)
-    assert seen.pelvis is not None
-    alone = seen.step.astype(float)
-    seen.pelvis[:, 1] = -0.8 * alone[:, 0] + 0.4 * alone[:, 1]
-    found = check(seen)
-    assert found["toward_foot_mps2"] == pytest.approx(-0.6)
-    assert not {"turned_rad", "inner_foot_m"} & set(found)
-    assert check(exchanged(seen))["toward_foot_mps2"] == pytest.approx(0.6)
-    both = walk(pelvis=True)
-    both.step[:, 1] = False
-    assert "toward_foot_mps2" not in check(both)
+    observations = walk(pelvis=True)
+    assert observations.pelvis is not None
+    single = observations.step.astype(float)
+    observations.pelvis[:, 1] = -0.8 * single[:, 0] + 0.4 * single[:, 1]
+    result = check(observations)
+    assert result["toward_foot_mps2"] == pytest.approx(-0.6)
+    assert not {"turned_rad", "inner_foot_m"} & set(result)
+    assert check(exchanged(observations))["toward_foot_mps2"] == pytest.approx(0.6)
+    joint_walk = walk(pelvis=True)
+    joint_walk.step[:, 1] = False
+    assert "toward_foot_mps2" not in check(joint_walk)
 
 
 def test_rise_and_tilt_of_the_pelvis_are_those_of_its_movement() -> None:
-    seen = walk(pelvis=True)
-    assert seen.pelvis is not None
+    observations = walk(pelvis=True)
+    assert observations.pelvis is not None
     t = np.arange(N) / RATE
     depth, width_s = 0.3, 0.3
     u = (t - 4.0) / width_s
-    seen.pelvis[:, 0] = -depth * (u**2 - 1.0) * np.exp(-0.5 * u**2) / width_s**2
-    seen.pelvis[:, 2] = 0.1 + 0.02 * np.sin(2.0 * np.pi * t)
-    found = check(seen)
-    assert found["pelvis_rise_m"] == pytest.approx(depth, rel=0.15)
-    assert found["pelvis_tilt_sd_rad"] == pytest.approx(0.02 / np.sqrt(2.0), rel=0.01)
+    observations.pelvis[:, 0] = -depth * (u**2 - 1.0) * np.exp(-0.5 * u**2) / width_s**2
+    observations.pelvis[:, 2] = 0.1 + 0.02 * np.sin(2.0 * np.pi * t)
+    result = check(observations)
+    assert result["pelvis_rise_m"] == pytest.approx(depth, rel=0.15)
+    assert result["pelvis_tilt_sd_rad"] == pytest.approx(0.02 / np.sqrt(2.0), rel=0.01)
 
 
-def inputs(turned: Floats, worn: str) -> L7sInputs:
+def inputs(turned: Floats, segments: str) -> L7sInputs:
     acc = np.zeros((2, 3, 3))
     acc[:, 0] = (1.0, 2.0, 3.0)
-    return L7sInputs(np.broadcast_to(turned, (2, 3, 3, 3)), acc, np.ones((2, 2), np.bool_), worn)  # type: ignore[arg-type]
+    return L7sInputs(np.broadcast_to(turned, (2, 3, 3, 3)), acc, np.ones((2, 2), np.bool_), segments)  # type: ignore[arg-type]
 
 
 def test_a_block_is_seen_level_and_in_the_axes_of_the_pelvis() -> None:
     turned = to_matrix(about(2, 0.5 * np.pi)) @ to_matrix(about(1, 0.3))
     p = np.arange(18.0).reshape(2, 3, 3)
     track = L7sTrack(np.zeros((2, 3, 3, 3)), p, p, np.zeros((2, 27)))
-    seen = SeenWalk.of(inputs(turned, "3I"), track)
-    assert seen.feet.tolist() == p[:, 1:, :2].tolist()
-    assert seen.forward == pytest.approx(2.0 * np.broadcast_to(turned[:2, 2], (2, 2)))
-    assert seen.pelvis is not None
+    observations = SeenWalk.of(inputs(turned, "3I"), track)
+    assert observations.feet.tolist() == p[:, 1:, :2].tolist()
+    assert observations.forward == pytest.approx(2.0 * np.broadcast_to(turned[:2, 2], (2, 2)))
+    assert observations.pelvis is not None
     # its left is −x of W now, and leaning forward is positive
-    assert seen.pelvis[0] == pytest.approx([3.0, -1.0, 0.3])
+    assert observations.pelvis[0] == pytest.approx([3.0, -1.0, 0.3])
     assert SeenWalk.of(inputs(turned, "2I"), track).pelvis is None
 
 
@@ -159,7 +159,7 @@ def test_blocks_are_put_together() -> None:
 
 
 def test_gaps_are_measured_in_seconds() -> None:
-    there = np.ones(100, np.bool_)
-    lost = there.copy()
+    mask = np.ones(100, np.bool_)
+    lost = mask.copy()
     lost[10:15] = lost[50:75] = False
-    assert longest_gaps({"pelvis": there, "foot_l": lost}, RATE) == {"pelvis": 0.0, "foot_l": 0.5}
+    assert longest_gaps({"pelvis": mask, "foot_l": lost}, RATE) == {"pelvis": 0.0, "foot_l": 0.5}

@@ -26,8 +26,8 @@ SENSOR = np.array([0.02, 0.0, 0.11])
 
 def rolling(rise_deg: float, strides: int = 4, ahead: Floats = SENSOR) -> L7sInputs:
     """Feet whose heels rise and fall about a ball that never leaves the floor, resting in between."""
-    rest, roll = np.zeros(60), np.radians(rise_deg) * np.sin(np.linspace(0.0, np.pi, 61)) ** 4
-    rise = np.concatenate([np.concatenate((rest, roll)) for _ in range(strides)] + [rest])
+    buffer, roll = np.zeros(60), np.radians(rise_deg) * np.sin(np.linspace(0.0, np.pi, 61)) ** 4
+    rise = np.concatenate([np.concatenate((buffer, roll)) for _ in range(strides)] + [buffer])
     still = np.concatenate([np.repeat((True, False), (60, 61)) for _ in range(strides)] + [np.ones(60, bool)])
     n = len(rise)
     # Sy's foot: z forward, y left, x down; the heel rises about y
@@ -69,8 +69,8 @@ def test_a_lost_push_off_is_left_out() -> None:
     acc[60:121, 1] = 50.0
     valid = np.ones((len(acc), 3), bool)
     valid[70:80, 1] = False
-    found = find_sensor_offsets(replace(inputs, acc=acc), valid, MODEL, RATE)
-    np.testing.assert_allclose(found, [-SENSOR, -SENSOR], atol=0.002)
+    sensor_offsets = find_sensor_offsets(replace(inputs, acc=acc), valid, MODEL, RATE)
+    np.testing.assert_allclose(sensor_offsets, [-SENSOR, -SENSOR], atol=0.002)
 
 
 @pytest.mark.slow
@@ -83,11 +83,11 @@ def test_simulated_feet_have_their_sensors_where_they_are_found(name: str) -> No
     inputs = take_of(
         orientations, free_acceleration(calibrated, orientations), steps_of(calibrated), model, "2I"
     )
-    found = find_sensor_offsets(inputs, np.ones((len(inputs.step), 3), bool), model, RATE)
+    sensor_offsets = find_sensor_offsets(inputs, np.ones((len(inputs.step), 3), bool), model, RATE)
     for leg, side in enumerate(LEGS):
         x, y, _ = truth.mounts[FOOT[side]].position_m
         c, s = np.cos(model.incline), np.sin(model.incline)
         # from the ankle along and across the line to the ball, less half of it
         along, down = c * x - s * y - 0.5 * model.foot, -s * x - c * y
-        assert -found[leg, 2] == pytest.approx(along, abs=0.02)
-        assert -found[leg, 0] == pytest.approx(down, abs=0.02)
+        assert -sensor_offsets[leg, 2] == pytest.approx(along, abs=0.02)
+        assert -sensor_offsets[leg, 0] == pytest.approx(down, abs=0.02)

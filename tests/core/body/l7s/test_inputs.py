@@ -32,11 +32,11 @@ def test_inputs_are_measured_orientations_in_the_frames_of_the_paper(worn: str) 
     R, acc = poses()
     q = {s: from_matrix(R[:, b] @ MODEL.to_isb(s)) for b, s in enumerate(BODIES)}
     step = np.zeros((N, 2), bool)
-    made = arrange_inputs(q, {s: acc[:, b] for b, s in enumerate(BODIES)}, step, MODEL, worn)  # type: ignore[arg-type]
-    np.testing.assert_allclose(made.R[:, 1:], R[:, 1:], atol=1e-12)
+    result = arrange_inputs(q, {s: acc[:, b] for b, s in enumerate(BODIES)}, step, MODEL, worn)  # type: ignore[arg-type]
+    np.testing.assert_allclose(result.R[:, 1:], R[:, 1:], atol=1e-12)
     pelvis = (R[:, 0], acc[:, 0]) if worn == "3I" else (np.eye(3), 0.5 * (acc[:, 1] + acc[:, 2]))
-    np.testing.assert_allclose(made.R[:, 0], np.broadcast_to(pelvis[0], (N, 3, 3)), atol=1e-12)
-    np.testing.assert_allclose(made.acc[:, 0], pelvis[1], atol=1e-12)
+    np.testing.assert_allclose(result.R[:, 0], np.broadcast_to(pelvis[0], (N, 3, 3)), atol=1e-12)
+    np.testing.assert_allclose(result.acc[:, 0], pelvis[1], atol=1e-12)
 
 
 def test_gravity_and_what_the_norm_at_rest_is_over_it_are_taken_off() -> None:
@@ -47,20 +47,20 @@ def test_gravity_and_what_the_norm_at_rest_is_over_it_are_taken_off() -> None:
     world = moved + np.array([0.0, 0.0, GRAVITY])
     inverse = q * np.array([1.0, -1.0, -1.0, -1.0])
     acc = (rotate(inverse, world) + np.array([0.0, 0.3, 0.0])) @ mount
-    found = remove_gravity(acc, valid, q, mounted)
-    np.testing.assert_allclose(found[valid], moved[valid], atol=1e-12)
-    np.testing.assert_array_equal(found[~valid], 0.0)
+    result = remove_gravity(acc, valid, q, mounted)
+    np.testing.assert_allclose(result[valid], moved[valid], atol=1e-12)
+    np.testing.assert_array_equal(result[~valid], 0.0)
 
 
 def all_known(valid: list[Bools], step: Bools) -> Bools:
     """Whole-take form: every sensor there, and each foot has rested since it was lost."""
     index = np.arange(len(step))
-    known = np.logical_and.reduce(valid)
-    for leg, there in enumerate(valid[-2:]):
-        lost = np.maximum.accumulate(np.where(there, -1, index))
-        rested = np.maximum.accumulate(np.where(there & step[:, leg], index, -1))
-        known &= rested >= lost
-    return np.asarray(known)
+    reference = np.logical_and.reduce(valid)
+    for leg, target in enumerate(valid[-2:]):
+        lost = np.maximum.accumulate(np.where(target, -1, index))
+        rested = np.maximum.accumulate(np.where(target & step[:, leg], index, -1))
+        reference &= rested >= lost
+    return np.asarray(reference)
 
 
 @pytest.mark.parametrize("bodies", [2, 3])

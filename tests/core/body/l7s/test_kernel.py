@@ -71,25 +71,34 @@ def test_the_prediction_is_that_of_the_paper(printed: bool) -> None:
     )
     assert p == pytest.approx(expected_p)
     assert v == pytest.approx(expected_v)
-    found = wide.reshape(WIDTH, WIDTH)
-    np.testing.assert_allclose(found[:N, :N], F @ P @ F.T + noise, atol=1e-9)
-    assert not found[N].any()
-    assert not found[:, N].any()
+    result = wide.reshape(WIDTH, WIDTH)
+    np.testing.assert_allclose(result[:N, :N], F @ P @ F.T + noise, atol=1e-9)
+    assert not result[N].any()
+    assert not result[:, N].any()
 
 
 def rows_of(
     group: int, R: Floats, p: Floats, v: Floats, measured: Floats
 ) -> tuple[Floats, Floats, Floats, list[int]]:
     """H (3, 27), residuals and variances of a group, and the places it reads."""
-    at, H, left, variance, gain = updates.make_form()
-    given = np.array([0.3, 0.4])
+    index, H, left, variance, gain = updates.make_form()
+    values = np.array([0.3, 0.4])
     triples = kernel._write_rows(
-        group, R, p, v, measured, given, HEIGHTS, VARIANCES, (at, H, left, variance, gain), np.empty((3, 3))
+        group,
+        R,
+        p,
+        v,
+        measured,
+        values,
+        HEIGHTS,
+        VARIANCES,
+        (index, H, left, variance, gain),
+        np.empty((3, 3)),
     )
     whole = np.zeros((3, N))
     for t in range(triples):
-        whole[:, at[t] : at[t] + 3] += H[:, 3 * t : 3 * t + 3]
-    return whole, left, variance, at[:triples].tolist()
+        whole[:, index[t] : index[t] + 3] += H[:, 3 * t : 3 * t + 3]
+    return whole, left, variance, index[:triples].tolist()
 
 
 def move(R: Floats, p: Floats, v: Floats, e: Floats) -> tuple[Floats, Floats, Floats]:
@@ -118,16 +127,16 @@ def move(R: Floats, p: Floats, v: Floats, e: Floats) -> tuple[Floats, Floats, Fl
 def test_residuals_shrink_along_their_own_rows(group: int, places: list[int], spreads: list[float]) -> None:
     R, p, v = state()
     measured = R.copy()
-    H, left, variance, at = rows_of(group, R, p, v, measured)
+    H, left, variance, position = rows_of(group, R, p, v, measured)
     rows = len(spreads)
-    assert at == places
+    assert position == places
     assert variance[:rows] == pytest.approx(spreads)
     step = 1e-6
     for i in range(N):
         e = np.zeros(N)
         e[i] = step
-        after = rows_of(group, *move(R, p, v, e), measured)[1]
-        slope = (left[:rows] - after[:rows]) / step
+        final = rows_of(group, *move(R, p, v, e), measured)[1]
+        slope = (left[:rows] - final[:rows]) / step
         assert slope == pytest.approx(H[:rows, i], abs=1e-4), i
 
 
@@ -136,9 +145,9 @@ def test_the_pelvis_without_a_sensor_faces_as_the_feet_do_and_stays_level() -> N
     feet = R[1, :2, 2] + R[2, :2, 2]
     theta = float(np.arctan2(feet[1], feet[0]))
     R[0] = to_matrix(exp(np.array([0.0, 0.0, theta])))
-    H, left, variance, at = rows_of(7, R, p, v, R)
+    H, left, variance, position = rows_of(7, R, p, v, R)
     assert left == pytest.approx(0.0, abs=1e-9)
-    assert at == [3, 9, 15]
+    assert position == [3, 9, 15]
     assert variance == pytest.approx(0.1)
     R[0] = to_matrix(exp(np.array([0.0, 0.0, theta - 0.2])))
     assert rows_of(7, R, p, v, R)[1] == pytest.approx([0.0, 0.0, 0.2])

@@ -18,9 +18,9 @@ def test_legs_are_those_of_the_law_of_cosines() -> None:
     """Sy 2021 eq 40–44."""
     R, p = poses()
     legs = solve_legs(R, p, MODEL)
-    q, at = ({s: x[:, i] for i, s in enumerate(FIGURE)} for x in (legs.q, legs.p))
+    q, position = ({s: x[:, i] for i, s in enumerate(FIGURE)} for x in (legs.q, legs.p))
     np.testing.assert_allclose(q["pelvis"], from_matrix(R[:, 0] @ MODEL.to_isb("pelvis")), atol=1e-12)
-    np.testing.assert_array_equal(at["pelvis"], p[:, 0])
+    np.testing.assert_array_equal(position["pelvis"], p[:, 0])
     straight = 0
     for leg, side in enumerate(LEGS):
         y = R[:, 1 + leg, :, 1]
@@ -37,10 +37,10 @@ def test_legs_are_those_of_the_law_of_cosines() -> None:
             x = unit(np.cross(y, z))
             frame = np.stack((x, np.cross(z, x), z), axis=-1) @ MODEL.to_isb(segment)
             np.testing.assert_allclose(q[segment], from_matrix(frame), atol=1e-12)
-            np.testing.assert_allclose(at[segment], origin, atol=1e-12)
+            np.testing.assert_allclose(position[segment], origin, atol=1e-12)
         foot = FOOT[side]
         np.testing.assert_allclose(q[foot], from_matrix(R[:, 1 + leg] @ MODEL.to_isb(foot)), atol=1e-12)
-        np.testing.assert_allclose(at[foot], ankle, atol=1e-12)
+        np.testing.assert_allclose(position[foot], ankle, atol=1e-12)
         np.testing.assert_allclose(legs.reach[:, leg], d, atol=1e-12)
         np.testing.assert_allclose(legs.hinge[:, leg], np.sum(y * tau, axis=1), atol=1e-12)
     assert 0 < straight < 2 * N

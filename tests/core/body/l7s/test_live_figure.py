@@ -16,10 +16,10 @@ from tests.core.body.live_standing import BODY, NEUTRAL, RATE, mounted, stand
 THREE: tuple[Segment, ...] = ("foot_r", "pelvis", "foot_l")
 
 
-def figure(*worn: Segment) -> LiveL7s:
-    column, known = {s: i for i, s in enumerate(worn)}, mounted(*worn)
-    feet = FootPaths(FilteredSensors(("foot_l", "foot_r"), column, known, BODY, RATE, live_params()))
-    return LiveL7s(column, known, BODY, RATE, feet)
+def figure(*segments: Segment) -> LiveL7s:
+    column, reference = {s: i for i, s in enumerate(segments)}, mounted(*segments)
+    feet = FootPaths(FilteredSensors(("foot_l", "foot_r"), column, reference, BODY, RATE, live_params()))
+    return LiveL7s(column, reference, BODY, RATE, feet)
 
 
 @pytest.mark.parametrize(("worn", "method"), [(THREE, "l7s_3i"), (("foot_l", "foot_r"), "l7s_2i")])
@@ -69,11 +69,11 @@ def test_what_cannot_be_followed_ends_it_from_that_sample_on_however_the_samples
     assert not whole.push(stand(5, *THREE)).whole.any()
     parts = figure(*THREE)
     parts.push(stand(100, *THREE))
-    given = broken_at(7)
-    found: list[BodyBlock] = []
+    broken = broken_at(7)
+    result: list[BodyBlock] = []
     for a, b in ((0, 3), (3, 9), (9, 20)):
-        turned = {s: x[a:b] for s, x in given.turned.items()}
+        turned = {s: x[a:b] for s, x in broken.turned.items()}
         k = slice(a, b)
-        part = MeasuredBlock(given.acc[k], given.gyr[k], given.valid[k], turned, given.filled[k])
-        found.append(parts.push(part))
-    np.testing.assert_array_equal(np.concatenate([x.p for x in found]), block.p)
+        part = MeasuredBlock(broken.acc[k], broken.gyr[k], broken.valid[k], turned, broken.filled[k])
+        result.append(parts.push(part))
+    np.testing.assert_array_equal(np.concatenate([x.p for x in result]), block.p)

@@ -43,8 +43,8 @@ def solve_densely(
 
     def add(weight: float, terms: dict[tuple[int, int], float], residual: float) -> None:
         row = np.zeros((T, SIZE))
-        for at, value in terms.items():
-            row[at] += value
+        for index, value in terms.items():
+            row[index] += value
         rows.append((weight, row.reshape(-1), residual))
 
     for k in range(T):
@@ -110,6 +110,6 @@ def test_a_sweep_leaves_the_negative_inverse_below_the_diagonal() -> None:
     A = B @ B.T + np.eye(SIZE)
     swept = np.tril(A).reshape(-1)
     assert node_kernel._sweep(swept, np.empty(SIZE))
-    found = np.tril(swept.reshape(SIZE, SIZE))
-    assert found == pytest.approx(np.tril(-np.linalg.inv(A)))
+    tril = np.tril(swept.reshape(SIZE, SIZE))
+    assert tril == pytest.approx(np.tril(-np.linalg.inv(A)))
     assert not node_kernel._sweep((A - 20.0 * np.eye(SIZE)).reshape(-1).copy(), np.empty(SIZE))

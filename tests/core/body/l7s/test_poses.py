@@ -38,14 +38,14 @@ MODEL = LegModel.of(BODY)
 
 def still_feet(calibrated: CalibratedRecording) -> dict[Side, Bools]:
     """Where each foot rests, by the rule on its own signals."""
-    found: dict[Side, Bools] = {}
+    result: dict[Side, Bools] = {}
     for side in SIDES:
         signals = calibrated.recording.sensors[FOOT[side]]
         bias = calibrated.calibration.segments[FOOT[side]].gyro_bias
-        found[side] = still_samples(
+        result[side] = still_samples(
             signals.acc, signals.gyr - bias, signals.valid, calibrated.recording.rate_hz, FOOT_STILL
         )
-    return found
+    return result
 
 
 @cache
@@ -55,10 +55,10 @@ def walk() -> tuple[CalibratedRecording, Orientations, dict[Side, Bools], WalkTr
     return calibrated, estimate_orientations(calibrated), still_feet(calibrated), truth
 
 
-def poses_of(worn: Worn, params: L7sParams | None = None, *, both_ways: bool = True) -> Poses:
+def poses_of(segments: Worn, params: L7sParams | None = None, *, both_ways: bool = True) -> Poses:
     calibrated, orientations, steps, truth = walk()
     acceleration = free_acceleration(calibrated, orientations)
-    return l7s_poses(orientations, acceleration, steps, truth.body, params, worn, both_ways=both_ways)
+    return l7s_poses(orientations, acceleration, steps, truth.body, params, segments, both_ways=both_ways)
 
 
 def random_state(seed: int) -> tuple[Floats, Floats, Floats]:
@@ -84,9 +84,9 @@ def test_constraint_rows_are_the_derivatives_of_what_they_hold(leg: int, reach: 
             dx[k] = sign * step
             Rk, pk, vk = R.copy(), p.copy(), v.copy()
             inject(Rk, pk, vk, dx, work)
-            there = np.zeros(2)
-            constraint_rows(Rk, pk, leg, 0.09, 0.1, 0.9, np.zeros((2, 12)), there, 0)
-            ends.append(there)
+            values = np.zeros(2)
+            constraint_rows(Rk, pk, leg, 0.09, 0.1, 0.9, np.zeros((2, 12)), values, 0)
+            ends.append(values)
         # d is what is missing: minus the constraint
         slope = -(ends[0] - ends[1]) / (2.0 * step)
         row = np.zeros((count, 27))
@@ -127,10 +127,10 @@ def test_the_reset_keeps_the_covariance_symmetric_and_positive() -> None:
     A = rng.normal(0.0, 1.0, (27, 27))
     P, dx, turn = np.zeros((28, 28)), np.zeros(28), np.eye(27)
     P[:27, :27], dx[:27] = A @ A.T + np.eye(27), rng.normal(0.0, 0.3, 27)
-    for at in (0, 6, 12):
+    for index in (0, 6, 12):
         same, cross = np.empty((3, 3)), np.empty((3, 3))
-        right_jacobian(dx, at, same, cross)
-        turn[at : at + 6, at : at + 6] = np.block([[same, cross], [np.zeros((3, 3)), same]])
+        right_jacobian(dx, index, same, cross)
+        turn[index : index + 6, index : index + 6] = np.block([[same, cross], [np.zeros((3, 3)), same]])
     turned = turn @ P[:27, :27] @ turn.T
     reset(P.reshape(-1), dx, np.empty((3, 2, 3, 3)))
     np.testing.assert_allclose(P[:27, :27], turned, rtol=1e-12, atol=1e-12)
@@ -153,23 +153,23 @@ FLEXION = ("hip_flexion", "knee_flexion", "ankle_dorsiflexion")
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_angles_and_strides_of_a_simulated_walk_are_within_the_limits(worn: Worn, both_ways: bool) -> None:
     calibrated, _, _, truth = walk()
-    found = poses_of(worn, both_ways=both_ways)
-    posed = Orientations(found.t_s, found.rate_hz, found.q, dict.fromkeys(found.q, found.valid), found.method)
+    poses = poses_of(worn, both_ways=both_ways)
+    posed = Orientations(poses.t_s, poses.rate_hz, poses.q, dict.fromkeys(poses.q, poses.valid), poses.method)
     angles = measure_angles(posed, calibrated.calibration.zero).angles
-    true, n = truth.subtract_standing(), len(found.t_s)
-    moving = (found.t_s > truth.stands[0][1]) & (found.t_s < truth.stands[-1][0])
+    true, n = truth.subtract_standing(), len(poses.t_s)
+    moving = (poses.t_s > truth.stands[0][1]) & (poses.t_s < truth.stands[-1][0])
     for name, rmse, r in zip(FLEXION, *LIMITS[worn], strict=True):
-        both = [(angles[f"{name}_{e}"][moving], true[f"{name}_{e}"][:n][moving]) for e in "lr"]
-        assert np.mean([np.degrees((a - b).std()) for a, b in both]) < rmse, name
-        assert np.mean([np.corrcoef(a, b)[0, 1] for a, b in both]) > r, name
+        pair = [(angles[f"{name}_{e}"][moving], true[f"{name}_{e}"][:n][moving]) for e in "lr"]
+        assert np.mean([np.degrees((a - b).std()) for a, b in pair]) < rmse, name
+        assert np.mean([np.corrcoef(a, b)[0, 1] for a, b in pair]) > r, name
     errors = []
     for stride in truth.strides:
-        k = [min(round((t + 0.25) * found.rate_hz), n - 1) for t in (stride.start_s, stride.end_s)]
-        foot = found.p[FOOT[stride.side]]
+        k = [min(round((t + 0.25) * poses.rate_hz), n - 1) for t in (stride.start_s, stride.end_s)]
+        foot = poses.p[FOOT[stride.side]]
         errors.append(np.linalg.norm((foot[k[1]] - foot[k[0]])[:2]) - stride.length_m)
     assert np.sqrt(np.mean(np.square(errors))) < 0.04
-    assert found.diagnostics["min_eigenvalue"] > 0.0  # type: ignore[operator]
-    assert max(found.diagnostics["hinge_m"].values()) < 1e-4  # type: ignore[attr-defined]
+    assert poses.diagnostics["min_eigenvalue"] > 0.0  # type: ignore[operator]
+    assert max(poses.diagnostics["hinge_m"].values()) < 1e-4  # type: ignore[attr-defined]
 
 
 @pytest.mark.slow
@@ -191,8 +191,8 @@ def test_the_share_of_straight_knees_does_not_depend_on_the_number_of_projection
 def test_any_split_into_blocks_gives_the_same_bits() -> None:
     calibrated, orientations, steps, _ = walk()
     acceleration = free_acceleration(calibrated, orientations)
-    for worn in ("3I", "2I"):
-        inputs = take_of(orientations, acceleration, steps, MODEL, worn).part(slice(500, 1400))
+    for segments in ("3I", "2I"):
+        inputs = take_of(orientations, acceleration, steps, MODEL, segments).part(slice(500, 1400))
         first = start_l7s_state(inputs, MODEL)
         whole, end = filter_block(first, inputs, MODEL, 100.0)
         state, parts = first, []
@@ -209,8 +209,8 @@ def test_the_covariance_and_the_figure_after_ten_minutes_are_those_after_one() -
     """Sy 2021 §V-D expects that long walks need a limit on the covariance; they do not."""
     calibrated, orientations, steps, _ = walk()
     acceleration = free_acceleration(calibrated, orientations)
-    for worn in ("3I", "2I"):
-        inputs = take_of(orientations, acceleration, steps, MODEL, worn).part(slice(None))
+    for segments in ("3I", "2I"):
+        inputs = take_of(orientations, acceleration, steps, MODEL, segments).part(slice(None))
         state, least, apart = start_l7s_state(inputs, MODEL), [], []
         for _ in range(12):
             track, state = filter_block(state, inputs, MODEL, 100.0)
@@ -227,11 +227,11 @@ def test_a_common_turn_of_the_world_turns_the_result() -> None:
     turn = about(2, 1.1)
     turned = replace(orientations, q={s: multiply(turn, q) for s, q in orientations.q.items()})
     moved = {s: a[:] @ to_matrix(turn).T for s, a in acceleration.items()}
-    for worn in ("3I", "2I"):
-        one = l7s_poses(orientations, acceleration, steps, BODY, worn=worn)
-        other = l7s_poses(turned, moved, steps, BODY, worn=worn)
+    for segments in ("3I", "2I"):
+        one = l7s_poses(orientations, acceleration, steps, BODY, configuration=segments)
+        second = l7s_poses(turned, moved, steps, BODY, configuration=segments)
         for segment in one.p:
-            np.testing.assert_allclose(other.p[segment], one.p[segment] @ to_matrix(turn).T, atol=1e-6)
+            np.testing.assert_allclose(second.p[segment], one.p[segment] @ to_matrix(turn).T, atol=1e-6)
 
 
 def test_what_cannot_be_estimated_is_refused_with_its_name() -> None:
@@ -265,33 +265,33 @@ def test_places_that_were_not_found_are_told(
 ) -> None:
     calibrated, orientations, steps, truth = walk()
     monkeypatch.setattr(smoother, "PASSES", passes)
-    found = l7s_poses(orientations, free_acceleration(calibrated, orientations), steps, truth.body)
-    assert [f.verdict for f in found.health if f.name == "places_moved_mm"] == [verdict]
-    assert ("places_not_found" in {n.code for n in found.notices}) == (verdict == "bad")
+    result = l7s_poses(orientations, free_acceleration(calibrated, orientations), steps, truth.body)
+    assert [f.verdict for f in result.health if f.name == "places_moved_mm"] == [verdict]
+    assert ("places_not_found" in {n.code for n in result.notices}) == (verdict == "bad")
 
 
 def test_a_foot_that_never_rests_is_told() -> None:
     calibrated, orientations, steps, truth = walk()
     never = {**steps, "left": np.zeros_like(steps["left"])}
-    found = l7s_poses(orientations, free_acceleration(calibrated, orientations), never, truth.body)
-    assert "foot_never_still" in {n.code for n in found.notices}
+    result = l7s_poses(orientations, free_acceleration(calibrated, orientations), never, truth.body)
+    assert "foot_never_still" in {n.code for n in result.notices}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("share", "verdict"), [(0.19, "good"), (0.4, "warn"), (0.6, "bad")])
 def test_a_knee_that_mostly_rests_on_its_bound_is_no_measurement(share: float, verdict: str) -> None:
-    made = poses_of("3I")
-    diagnostics = {**made.diagnostics, "knee_straight_share": {"left": 0.05, "right": share}}
-    judged = replace(made, health=l7s_health(replace(made, diagnostics=diagnostics)))
-    found = {f.of: f.verdict for f in judged.health if f.name == "knee_straight_pct"}
-    assert found == {"leg_l": "good", "leg_r": verdict}
+    poses = poses_of("3I")
+    diagnostics = {**poses.diagnostics, "knee_straight_share": {"left": 0.05, "right": share}}
+    variant = replace(poses, health=l7s_health(replace(poses, diagnostics=diagnostics)))
+    result = {f.of: f.verdict for f in variant.health if f.name == "knee_straight_pct"}
+    assert result == {"leg_l": "good", "leg_r": verdict}
     calibrated, orientations, _, _ = walk()
-    posed = Orientations(made.t_s, made.rate_hz, made.q, dict.fromkeys(made.q, made.valid), made.method)
+    posed = Orientations(poses.t_s, poses.rate_hz, poses.q, dict.fromkeys(poses.q, poses.valid), poses.method)
     angles = replace(
         measure_angles(posed, calibrated.calibration.zero),
         diagnostics={"estimated": ("knee_flexion_l", "knee_flexion_r", "hip_flexion_r")},
     )
-    kept = withhold(angles, judged, orientations)
+    retained = withhold(angles, variant, orientations)
     gone = {"knee_flexion_r", "hip_flexion_r"} if verdict == "bad" else set()
-    assert set(kept.withheld) == gone
-    assert "knee_flexion_l" in kept.angles
+    assert set(retained.withheld) == gone
+    assert "knee_flexion_l" in retained.angles

@@ -36,8 +36,8 @@ def walk(worn: Worn) -> tuple[L7sInputs, L7sTrack, LegModel, Floats]:
     return inputs, track, model, places
 
 
-def whole(worn: Worn) -> WholeTrack:
-    inputs, track, model, _ = walk(worn)
+def whole(segments: Worn) -> WholeTrack:
+    inputs, track, model, _ = walk(segments)
     return smooth_track(track, inputs, np.ones((len(inputs.step), 3), bool), model, 100.0)
 
 
@@ -77,10 +77,10 @@ class Problem:
     def rows(self, flat: Floats) -> Floats:
         """Residuals over the roots of their variances (docs/science/l7s.md, "Both ways")."""
         x, hop, last = flat.reshape(-1, 9), HOP_S, len(self.x) - 1
-        found: list[float] = []
+        values: list[float] = []
 
         def add(residual: Floats | float, density: float) -> None:
-            found.extend(np.atleast_1d(np.asarray(residual) * np.sqrt(hop / density)))
+            values.extend(np.atleast_1d(np.asarray(residual) * np.sqrt(hop / density)))
 
         for k in range(last + 1):
             add(x[k] - self.pull[k], smoother.ANYWHERE)
@@ -93,7 +93,7 @@ class Problem:
             add((pelvis - 0.5 * left - 0.5 * right)[:2], smoother.MID_PELVIS)
             add(pelvis[2] - HEIGHTS[0], smoother.PELVIS_HEIGHT)
             for leg, foot in enumerate((left, right)):
-                own, other = self.still[k, leg], self.still[k, 1 - leg]
+                own, other_still = self.still[k, leg], self.still[k, 1 - leg]
                 add(foot[2] - HEIGHTS[1], smoother.FOOT_HEIGHT[0 if own else 1])
                 if own and k < last:
                     add(x[k + 1].reshape(3, 3)[1 + leg] - foot, smoother.REST_M**2 * hop)
@@ -101,46 +101,46 @@ class Problem:
                 leg_vector = hip - foot + LENGTHS[1] * self.R[k, 1 + leg, :, 2]
                 reach = float(np.linalg.norm(leg_vector))
                 add(self.R[k, 1 + leg, :, 1] @ leg_vector, smoother.HINGE)
-                add((reach - LENGTHS[3]) * float(own and not other), smoother.CARRIES)
+                add((reach - LENGTHS[3]) * float(own and not other_still), smoother.CARRIES)
                 add(max(reach - LENGTHS[2], 0.0), smoother.LONGER)
-        return np.array(found)
+        return np.array(values)
 
 
 def test_a_pass_is_that_of_gauss_newton_on_what_is_made_small(monkeypatch: pytest.MonkeyPatch) -> None:
     """With derivatives by differences and all equations in one matrix."""
-    of = Problem.make(9)
-    assert of.still.any(axis=0).all()
-    assert not of.still.all(axis=1).all()
-    step, flat = 1e-6, of.x.reshape(-1)
+    source = Problem.make(9)
+    assert source.still.any(axis=0).all()
+    assert not source.still.all(axis=1).all()
+    step, flat = 1e-6, source.x.reshape(-1)
     ways = step * np.eye(flat.size)
-    J = np.stack([(of.rows(flat + way) - of.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
+    J = np.stack([(source.rows(flat + way) - source.rows(flat - way)) / (2.0 * step) for way in ways], axis=1)
     monkeypatch.setattr(smoother, "PASSES", 1)
-    found, passes, moved = of.solve()
+    result, passes, moved = source.solve()
     assert passes == 1
-    assert moved == pytest.approx(np.abs(found - of.x).max())
-    expected = of.x - np.linalg.solve(J.T @ J, J.T @ of.rows(flat)).reshape(of.x.shape)
-    np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert moved == pytest.approx(np.abs(result - source.x).max())
+    expected = source.x - np.linalg.solve(J.T @ J, J.T @ source.rows(flat)).reshape(source.x.shape)
+    np.testing.assert_allclose(result, expected, atol=1e-6)
 
 
 def test_places_that_are_no_numbers_are_refused() -> None:
-    of = Problem.make(9)
+    source = Problem.make(9)
     with pytest.raises(EstimationError, match="cannot be found"):
-        replace(of, R=np.full_like(of.R, np.nan)).solve()
+        replace(source, R=np.full_like(source.R, np.nan)).solve()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("worn", ["3I", "2I"])
 def test_it_settles_and_meets_the_constraints(worn: Worn) -> None:
-    found, (_, _, model, _) = whole(worn), walk(worn)
-    legs = solve_legs(found.R, found.p, model)
-    assert found.passes < smoother.PASSES
-    assert found.moved < smoother.SETTLED_M
+    result, (_, _, model, _) = whole(worn), walk(worn)
+    legs = solve_legs(result.R, result.p, model)
+    assert result.passes < smoother.PASSES
+    assert result.moved < smoother.SETTLED_M
     assert legs.reach.max() < model.thigh + model.shank + 1e-5
     assert np.abs(legs.hinge).max() < 1e-5
 
 
 def test_places_are_nearer_the_truth_than_the_filters() -> None:
-    found, (_, track, model, places) = whole("3I"), walk("3I")
+    result, (_, track, model, places) = whole("3I"), walk("3I")
     moving = slice(600, 2400)
 
     def height_error(R: Floats, p: Floats) -> Floats:
@@ -149,11 +149,11 @@ def test_places_are_nearer_the_truth_than_the_filters() -> None:
         return np.asarray((hip - legs.p[:, [3, 6]].mean(axis=1))[moving, 2] - height[moving])
 
     height = places[:, 0, 2] - places[:, 1:, 2].mean(axis=1)
-    before, after = height_error(track.R, track.p), height_error(found.R, found.p)
+    initial, final = height_error(track.R, track.p), height_error(result.R, result.p)
     # the pull to the standing height lifts the filter's pelvis in every step
-    assert before.mean() > 0.01
-    assert abs(after.mean()) < 0.5 * before.mean()
-    assert after.std() < 0.75 * before.std()
+    assert initial.mean() > 0.01
+    assert abs(final.mean()) < 0.5 * initial.mean()
+    assert final.std() < 0.75 * initial.std()
 
 
 @pytest.mark.slow
@@ -163,9 +163,9 @@ def test_the_same_walk_backwards_in_the_world_and_moved_is_the_same(worn: Worn) 
     turn = to_matrix(about(2, 2.0))
     turned = L7sInputs(turn @ inputs.R, inputs.acc @ turn.T, inputs.step, worn)
     start = L7sTrack(turn @ track.R, track.p @ turn.T + [5.0, 7.0, 0.0], track.v, track.variance)
-    found = smooth_track(start, turned, np.ones((len(inputs.step), 3), bool), model, 100.0)
-    one, other = (solve_legs(x.R, x.p, model).reach for x in (whole(worn), found))
-    np.testing.assert_allclose(one, other, atol=1e-6)
+    result = smooth_track(start, turned, np.ones((len(inputs.step), 3), bool), model, 100.0)
+    one, second = (solve_legs(x.R, x.p, model).reach for x in (whole(worn), result))
+    np.testing.assert_allclose(one, second, atol=1e-6)
 
 
 def test_a_lost_foot_disturbs_its_own_swing_alone() -> None:
@@ -175,15 +175,15 @@ def test_a_lost_foot_disturbs_its_own_swing_alone() -> None:
     acc[lost, 2], valid[lost, 2] = 0.0, False
     broken = L7sInputs(inputs.R, acc, inputs.step, "3I")
     track, _ = filter_block(start_l7s_state(broken, model), broken, model, 100.0)
-    told = solve_legs(*places(smooth_track(track, broken, valid, model, 100.0)), model).reach
+    notices = solve_legs(*places(smooth_track(track, broken, valid, model, 100.0)), model).reach
     untold = solve_legs(
         *places(smooth_track(track, broken, ~np.zeros_like(valid), model, 100.0)), model
     ).reach
     right = solve_legs(*places(whole("3I")), model).reach
-    beside = np.ones(len(right), bool)
-    beside[1350:1680] = False
-    assert np.abs(told - right)[beside].max() < 0.005
-    assert np.abs(told - right).max() < np.abs(untold - right).max()
+    mask = np.ones(len(right), bool)
+    mask[1350:1680] = False
+    assert np.abs(notices - right)[mask].max() < 0.005
+    assert np.abs(notices - right).max() < np.abs(untold - right).max()
 
 
 def places(track: WholeTrack) -> tuple[Floats, Floats]:
@@ -194,5 +194,5 @@ def test_a_take_of_a_few_samples_is_the_filters() -> None:
     inputs, track, model, _ = walk("3I")
     few = slice(0, 4)
     short = L7sTrack(track.R[few], track.p[few], track.v[few], track.variance[few])
-    found = smooth_track(short, inputs.part(few), np.ones((4, 3), bool), model, 100.0)
-    np.testing.assert_allclose(found.p, short.p, atol=0.01)
+    result = smooth_track(short, inputs.part(few), np.ones((4, 3), bool), model, 100.0)
+    np.testing.assert_allclose(result.p, short.p, atol=0.01)

@@ -22,9 +22,9 @@ def short_windows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(windows, "LONG", 1000)
 
 
-def compare(found: Poses, whole: Poses) -> tuple[float, float]:
+def compare(result: Poses, whole: Poses) -> tuple[float, float]:
     """Largest difference in m of any place, and of a knee from its ankle."""
-    apart = {s: found.p[s] - whole.p[s] for s in whole.p}
+    apart = {s: result.p[s] - whole.p[s] for s in whole.p}
     legs = (np.abs(apart[SHANK[side]] - apart[FOOT[side]]).max() for side in SIDES)
     return max(float(np.abs(x).max()) for x in apart.values()), float(max(legs))
 
@@ -42,25 +42,25 @@ def test_windows_cover_a_take_once_and_begin_on_its_nodes(samples: int, rate_hz:
 
 
 def test_the_filter_says_the_same_in_windows(short_windows: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = poses_of("3I", both_ways=False)
+    result = poses_of("3I", both_ways=False)
     monkeypatch.undo()
     whole = poses_of("3I", both_ways=False)
-    assert {x.dtype.name for x in (*found.q.values(), *found.p.values())} == {"float32"}
+    assert {x.dtype.name for x in (*result.q.values(), *result.p.values())} == {"float32"}
     for s in whole.p:
-        np.testing.assert_array_equal(found.q[s], whole.q[s].astype(np.float32))
-        np.testing.assert_array_equal(found.p[s], whole.p[s].astype(np.float32))
-    assert found.diagnostics == whole.diagnostics
-    np.testing.assert_array_equal(found.valid, whole.valid)
+        np.testing.assert_array_equal(result.q[s], whole.q[s].astype(np.float32))
+        np.testing.assert_array_equal(result.p[s], whole.p[s].astype(np.float32))
+    assert result.diagnostics == whole.diagnostics
+    np.testing.assert_array_equal(result.valid, whole.valid)
 
 
 def test_places_in_windows_are_those_of_the_whole_take(
     short_windows: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(windows, "AROUND_S", 10.0)
-    found = poses_of("2I")
+    result = poses_of("2I")
     monkeypatch.undo()
     whole = poses_of("2I")
-    anywhere, knee = compare(found, whole)
+    anywhere, knee = compare(result, whole)
     # twelve times the margin leaves 1 mm
     assert anywhere < 0.1
     assert knee < 0.005

@@ -40,9 +40,9 @@ class TurningSensors:
 def turning(
     seconds: float, *, rate_hz: float = 100.0, sensors: int = 2, speed: float = 1.0, noise: float = 1.0
 ) -> TurningSensors:
-    """Sensors in sums of sines of angular rate (rad/s, times `speed`), with white noise times `noise`.
+    """Sensors with sums of sines of angular rate (rad/s, times `speed`) and white noise times `noise`.
 
-    Made once, for a sample at a time takes seconds: nobody writes into it.
+    Cached, since the sample-wise integration takes seconds: do not modify.
     """
     rng = np.random.default_rng(7)
     n = round(seconds * rate_hz)
@@ -71,8 +71,8 @@ def error_deg(q: Floats, truth: Floats) -> Floats:
 
 def tilt_deg(q: Floats, truth: Floats) -> Floats:
     """Angle in degrees between the verticals of orientations (..., 4)."""
-    one, other = (rotate(conjugate(x), UP) for x in (q, truth))
-    return np.asarray(np.degrees(np.arccos(np.clip((one * other).sum(-1), -1.0, 1.0))))
+    one, second = (rotate(conjugate(x), UP) for x in (q, truth))
+    return np.asarray(np.degrees(np.arccos(np.clip((one * second).sum(-1), -1.0, 1.0))))
 
 
 def trial_bytes(seconds: float = 6.0, rest_s: float = 2.0, **changes: Floats) -> bytes:

@@ -20,8 +20,8 @@ def test_a_turn_about_the_vertical_is_heading_and_one_about_the_horizontal_incli
         score = score_orientation(off, trial)
         assert score.total == pytest.approx(0.1, abs=1e-9)
         assert getattr(score, name) == pytest.approx(0.1, abs=1e-9)
-        other = {"heading", "inclination"} - {name}
-        assert getattr(score, other.pop()) == pytest.approx(0.0, abs=1e-7)
+        second = {"heading", "inclination"} - {name}
+        assert getattr(score, second.pop()) == pytest.approx(0.0, abs=1e-7)
 
 
 def test_the_bias_of_the_rest_is_taken_off_or_left() -> None:
@@ -41,14 +41,14 @@ def test_a_reference_that_is_no_rotation_is_lost() -> None:
     trial = read_trial("a", trial_bytes())
     q = trial.reference.copy()
     q[-3:] *= np.array([[0.0], [2.0], [1.0]])
-    again = read_trial("a", trial_bytes(opt_quat=q))
-    assert np.isnan(again.reference[-3:-1]).all()
-    assert (again.reference[-1] == q[-1]).all()
+    second_trial = read_trial("a", trial_bytes(opt_quat=q))
+    assert np.isnan(second_trial.reference[-3:-1]).all()
+    assert (second_trial.reference[-1] == q[-1]).all()
 
 
 def test_what_is_no_trial_is_refused() -> None:
-    alone = BytesIO()
-    np.save(alone, np.zeros((3, 3)))
+    single = BytesIO()
+    np.save(single, np.zeros((3, 3)))
     locked = bytearray(trial_bytes())
     for mark, flags in ((b"PK\x01\x02", 8), (b"PK\x03\x04", 6)):
         locked[locked.find(mark) + flags] |= 1
@@ -60,7 +60,7 @@ def test_what_is_no_trial_is_refused() -> None:
         *({"sampling_rate": np.array(rate)} for rate in (np.nan, 0.0, -5.0, 1e300, "fast", [100.0, 50.0])),
     )
     broken = (trial_bytes(6.0, 2.0, **x) for x in wrong)
-    for content in (b"nothing", b"", alone.getvalue(), bytes(locked), *broken):
+    for content in (b"nothing", b"", single.getvalue(), bytes(locked), *broken):
         with pytest.raises(FormatError) as caught:
             read_trial("a", content)
         assert caught.value.code == "not_a_trial"

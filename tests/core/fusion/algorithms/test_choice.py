@@ -1,4 +1,4 @@
-"""Filters asked for by name: what is listed, what can be tuned, and how the rest is refused."""
+"""Filters requested by name: listed, tunable, and refused ones."""
 
 from __future__ import annotations
 

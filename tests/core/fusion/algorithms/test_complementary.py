@@ -1,4 +1,4 @@
-"""The twelve correctors as they are written: they hold what is right and mend what is wrong."""
+"""The twelve correctors, uncompiled: stable at the truth, converging from errors."""
 
 from __future__ import annotations
 
@@ -55,20 +55,20 @@ def run(
     gains: Mapping[str, float] | None = None,
 ) -> tuple[Floats, Floats]:
     """Orientations (n, 4) of a sensor that rests in TRUE, and its state."""
-    given = prepare_complementary(
+    inputs = prepare_complementary(
         kind, Setting(by_kind()[kind](**(gains or {})), RATE, start[None], FIELD[None], True)
     )
     none = np.full((samples, 1, 3), np.nan)
     out = np.empty((samples, 1, 4))
     back = conjugate(TRUE)
-    given.run(
+    inputs.run(
         np.zeros((samples, 1, 3)) if gyr is None else np.broadcast_to(gyr, (samples, 1, 3)).copy(),
         np.broadcast_to(rotate(back, UP), (samples, 1, 3)).copy() if acc else none,
         np.broadcast_to(rotate(back, FIELD), (samples, 1, 3)).copy() if mag else none,
-        given.state,
+        inputs.state,
         out,
     )
-    return out[:, 0], given.state[0]
+    return out[:, 0], inputs.state[0]
 
 
 def off(q: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What every algorithm of the list has to do."""
+"""Contract of every listed algorithm."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def test_there_are_the_37_of_the_thesis_and_what_is_reconstructed_says_so() -> N
 def test_the_page_cites_every_paper_with_its_doi_or_says_that_none_was_found() -> None:
     page = (ROOT / "docs/science/filters.md").read_text("utf-8")
     for a in ALGORITHMS:
-        found = f"https://doi.org/{a.paper.doi}" if a.paper.doi else f"{a.paper.citation}. No DOI found."
-        assert found in page, a.name
+        result = f"https://doi.org/{a.paper.doi}" if a.paper.doi else f"{a.paper.citation}. No DOI found."
+        assert result in page, a.name
         assert a.paper.line.endswith(f"doi:{a.paper.doi}" if a.paper.doi else "No DOI found.")
 
 
@@ -94,23 +94,23 @@ def _say(value: object) -> str:
     "algorithm", [a for a in ALGORITHMS if a.magnetometer == "needed"], ids=lambda a: a.name
 )
 def test_what_needs_a_magnetometer_refuses_without(algorithm: Algorithm) -> None:
-    rest = RestMeans(np.array([[0.0, 0.0, 9.81]]), np.zeros((1, 3)))
+    rest_means = RestMeans(np.array([[0.0, 0.0, 9.81]]), np.zeros((1, 3)))
     with pytest.raises(EstimationError) as caught:
-        FusionFilter(algorithm.name, 100.0, rest)
+        FusionFilter(algorithm.name, 100.0, rest_means)
     assert caught.value.code == "no_magnetometer"
 
 
 def test_wrong_calls_are_refused() -> None:
-    rest = RestMeans(np.array([[0.0, 0.0, 9.81]]), np.zeros((1, 3)), np.array([[0.0, 20.0, -40.0]]))
+    rest_means = RestMeans(np.array([[0.0, 0.0, 9.81]]), np.zeros((1, 3)), np.array([[0.0, 20.0, -40.0]]))
     with pytest.raises(ParameterError, match="No algorithm"):
-        FusionFilter("kalman", 100.0, rest)
+        FusionFilter("kalman", 100.0, rest_means)
     with pytest.raises(ParameterError, match="takes MahonyGains"):
-        FusionFilter("mahony_2008", 100.0, rest, parameters.MadgwickGains())
+        FusionFilter("mahony_2008", 100.0, rest_means, parameters.MadgwickGains())
     with pytest.raises(ParameterError, match="rate"):
-        FusionFilter("mahony_2008", 0.0, rest)
+        FusionFilter("mahony_2008", 0.0, rest_means)
     with pytest.raises(ParameterError, match="share"):
-        FusionFilter("justa_2020", 100.0, rest, parameters.JustaGains(sigma_a=FixedGain(1.5)))
-    ready = FusionFilter("mahony_2008", 100.0, rest)
+        FusionFilter("justa_2020", 100.0, rest_means, parameters.JustaGains(sigma_a=FixedGain(1.5)))
+    ready = FusionFilter("mahony_2008", 100.0, rest_means)
     with pytest.raises(EstimationError, match="magnetometer"):
         ready.advance(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)))
     with pytest.raises(ParameterError, match="shape"):
@@ -177,8 +177,8 @@ def test_half_a_second_of_no_numbers_is_survived(algorithm: Algorithm) -> None:
     whole = errors(algorithm, start(algorithm, take).advance(take.gyr, take.acc, take.mag), take.q)[
         -500:
     ].mean()
-    before = errors(algorithm, q[1050], take.q[1050]).mean()
-    assert errors(algorithm, q, take.q)[-500:].mean() < whole + 0.6 * before
+    initial_average = errors(algorithm, q[1050], take.q[1050]).mean()
+    assert errors(algorithm, q, take.q)[-500:].mean() < whole + 0.6 * initial_average
 
 
 @pytest.mark.sweep
@@ -187,18 +187,20 @@ def test_blocks_of_any_length_and_sensors_alone_give_the_same_bits(algorithm: Al
     take = moving()
     n = 700
     whole = start(algorithm, take).advance(take.gyr[:n], take.acc[:n], take.mag[:n])
-    again = start(algorithm, take).advance(take.gyr[:n], take.acc[:n], take.mag[:n])
-    assert np.array_equal(whole, again)
-    running, parts, at = start(algorithm, take), [], 0
+    second = start(algorithm, take).advance(take.gyr[:n], take.acc[:n], take.mag[:n])
+    assert np.array_equal(whole, second)
+    running, parts, position = start(algorithm, take), [], 0
     for length in (1, 2, 0, 97, 300, 300):
-        part = slice(at, at + length)
+        part = slice(position, position + length)
         parts.append(running.advance(take.gyr[part], take.acc[part], take.mag[part]))
-        at += length
+        position += length
     assert np.array_equal(np.concatenate(parts), whole)
-    rest = take.rest()
-    assert rest.mag is not None
-    alone = FusionFilter(algorithm.name, take.rate_hz, RestMeans(rest.acc[1:], rest.gyr[1:], rest.mag[1:]))
-    steps = [alone.step(take.gyr[k, 1:], take.acc[k, 1:], take.mag[k, 1:]) for k in range(50)]
+    remainder = take.rest()
+    assert remainder.mag is not None
+    single = FusionFilter(
+        algorithm.name, take.rate_hz, RestMeans(remainder.acc[1:], remainder.gyr[1:], remainder.mag[1:])
+    )
+    steps = [single.step(take.gyr[k, 1:], take.acc[k, 1:], take.mag[k, 1:]) for k in range(50)]
     assert np.array_equal(np.array(steps), whole[:50, 1:])
 
 
@@ -208,8 +210,8 @@ def test_blocks_of_any_length_and_sensors_alone_give_the_same_bits(algorithm: Al
 )
 def test_without_a_magnetometer_it_keeps_the_vertical_and_learns_no_bias(algorithm: Algorithm) -> None:
     take = moving()
-    rest = take.rest()
-    running = FusionFilter(algorithm.name, take.rate_hz, RestMeans(rest.acc, rest.gyr))
+    remainder = take.rest()
+    running = FusionFilter(algorithm.name, take.rate_hz, RestMeans(remainder.acc, remainder.gyr))
     q = running.advance(take.gyr, take.acc)
     assert np.sqrt(np.mean(tilt_deg(q, take.q) ** 2)) < 2.0
     if algorithm.name in ("hyyti_2015", "valenti_2015"):
@@ -285,11 +287,11 @@ def test_fuzzy_gains_run_in_any_engine_and_blocks(name: str, params: parameters.
     whole = FusionFilter(name, take.rate_hz, take.rest(), params).advance(take.gyr, take.acc, take.mag)
     assert np.sqrt(np.mean(error_deg(whole, take.q) ** 2)) < 2.0
     parts = FusionFilter(name, take.rate_hz, take.rest(), params)
-    found = [
+    advances = [
         parts.advance(take.gyr[k : k + 1000], take.acc[k : k + 1000], take.mag[k : k + 1000])
         for k in range(0, len(take.gyr), 1000)
     ]
-    assert np.array_equal(np.concatenate(found), whole)
+    assert np.array_equal(np.concatenate(advances), whole)
 
 
 @pytest.mark.sweep
@@ -302,8 +304,8 @@ def test_the_process_noise_of_guo_follows_the_innovations() -> None:
     l1, l2, m1, m2, m3, m4, h1, h2 = shape.tolist()
     corners: Corners = (l1, l2, m1, m2, m3, m4, h1, h2)
 
-    def scaled(by: float) -> Corners:
-        a, b, c, d, e, f, g, h = (by * x for x in corners)
+    def scaled(key: float) -> Corners:
+        a, b, c, d, e, f, g, h = (key * x for x in corners)
         return a, b, c, d, e, f, g, h
 
     for sigma in (0.01, 1.5):
@@ -353,8 +355,8 @@ def test_to_first_order_four_complementary_filters_are_one() -> None:
         "wu_2019": parameters.Wu2019Gains(w_a=0.5, w_m=0.5, x=2.0 * share),
         "marantos_2016": parameters.MarantosGains(w_a=FixedGain(2.0 * share), w_m=FixedGain(2.0 * share)),
     }
-    found = [
+    advances = [
         FusionFilter(name, take.rate_hz, take.rest(), gains).advance(take.gyr, take.acc, take.mag)
         for name, gains in runs.items()
     ]
-    assert max(error_deg(q, found[0]).max() for q in found[1:]) < 0.05
+    assert max(error_deg(q, advances[0]).max() for q in advances[1:]) < 0.05

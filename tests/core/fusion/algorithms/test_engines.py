@@ -1,4 +1,4 @@
-"""From gains to a filter ready to run: what a rate changes, and what a missing magnetometer takes out."""
+"""From gains to a ready filter: effects of the rate and of a missing magnetometer."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def test_what_is_left_of_a_sample_is_the_same_after_a_second_at_every_rate() -> 
 @pytest.mark.parametrize("share", [0.5, 0.99])
 def test_a_driven_state_spreads_alike_in_the_long_run(share: float) -> None:
     for rate_hz in (25.0, 400.0):
-        given = setting(None, rate_hz)
-        spread = given.drive(2.0, share) / (1.0 - given.decay(share) ** 2)
+        inputs = setting(None, rate_hz)
+        spread = inputs.drive(2.0, share) / (1.0 - inputs.decay(share) ** 2)
         assert spread == pytest.approx(2.0 / (1.0 - share**2))
     assert setting(None).drive(2.0, share) == pytest.approx(2.0)
 
@@ -71,14 +71,14 @@ def test_every_algorithm_starts_at_the_orientations_it_is_given(algorithm: Algor
 
 
 def test_without_a_magnetometer_no_bias_about_the_vertical_is_learnt(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[list[float]] = []
+    requests: list[list[float]] = []
 
-    def listen(*given: object) -> None:
-        asked.append(list(given[7]))  # type: ignore[call-overload]
+    def listen(*inputs: object) -> None:
+        requests.append(list(inputs[7]))  # type: ignore[call-overload]
 
     monkeypatch.setattr(complementary, "run_complementary", listen)
     none = np.empty((0, 2, 3))
     for has_mag in (True, False):
-        made = prepare_complementary("gd", setting(parameters.MadgwickGains(zeta=0.05), has_mag=has_mag))
-        made.run(none, none, none, made.state, np.empty((0, 2, 4)))
-    assert asked == [[0.05, 0.0], [0.0, 0.0]]
+        result = prepare_complementary("gd", setting(parameters.MadgwickGains(zeta=0.05), has_mag=has_mag))
+        result.run(none, none, none, result.state, np.empty((0, 2, 4)))
+    assert requests == [[0.05, 0.0], [0.0, 0.0]]

@@ -87,8 +87,8 @@ def test_a_fuzzy_gain_is_the_centroid_of_its_truncated_sets() -> None:
     x = np.linspace(0.0, OUTPUT[7], 201)
     share = np.clip((x - OUTPUT[6]) / (OUTPUT[7] - OUTPUT[6]), 0.0, 1.0)
     rising = np.where(share < 0.5, 2.0 * share**2, 1.0 - 2.0 * (1.0 - share) ** 2)
-    found = choose(FuzzyGain(OUTPUT, acc=INPUT).row(), 0.0, 0.0, 0.0)
-    assert found == pytest.approx((rising * x).sum() / rising.sum(), rel=1e-12)
+    result = choose(FuzzyGain(OUTPUT, acc=INPUT).row(), 0.0, 0.0, 0.0)
+    assert result == pytest.approx((rising * x).sum() / rising.sum(), rel=1e-12)
 
 
 def test_corners_are_moved_until_neighbours_meet() -> None:

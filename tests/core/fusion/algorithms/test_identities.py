@@ -1,4 +1,4 @@
-"""The identities that let six engines stand for 37 algorithms, and the steps of the Kalman filters."""
+"""Identities that reduce 37 algorithms to six engines, and steps of the Kalman filters."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def observing(r: Floats, b: Floats) -> Floats:
 def test_w_is_symmetric_with_eigenvalues_of_one_and_keeps_q_where_b_is_r_in_the_sensor() -> None:
     q, r = unit(4), unit()
     b = rotate(conjugate(q), r)
-    found = observing(r, b)
-    assert np.abs(found + left(r) @ right(b)).max() < 1e-15
-    assert np.abs(found - found.T).max() < 1e-12
-    assert np.abs(np.abs(np.linalg.eigvalsh(found)) - 1.0).max() < 1e-12
-    assert np.abs(found @ q - q).max() < 1e-12
+    result = observing(r, b)
+    assert np.abs(result + left(r) @ right(b)).max() < 1e-15
+    assert np.abs(result - result.T).max() < 1e-12
+    assert np.abs(np.abs(np.linalg.eigvalsh(result)) - 1.0).max() < 1e-12
+    assert np.abs(result @ q - q).max() < 1e-12
     assert np.abs(observing(r, unit()) @ q - q).max() > 1e-3
 
 
@@ -132,12 +132,12 @@ def test_rows_one_by_one_equal_the_textbooks_update() -> None:
     P, H, y, variance = covariance(n), RNG.standard_normal((m, n)), RNG.standard_normal(m), 0.3
     S = H @ P @ H.T + variance * np.eye(m)
     K = P @ H.T @ np.linalg.inv(S)
-    found, dx, u = P.copy(), np.zeros(n), np.empty(n)
+    duplicate, dx, u = P.copy(), np.zeros(n), np.empty(n)
     for i in range(m):
-        kalman.take_scalar(found, H[i], variance, y[i], dx, u)
-    assert np.abs(found - (np.eye(n) - K @ H) @ P).max() < 1e-12
+        kalman.take_scalar(duplicate, H[i], variance, y[i], dx, u)
+    assert np.abs(duplicate - (np.eye(n) - K @ H) @ P).max() < 1e-12
     assert np.abs(dx - K @ y).max() < 1e-12
-    assert np.array_equal(found, found.T)
+    assert np.array_equal(duplicate, duplicate.T)
 
 
 @pytest.mark.slow
@@ -145,9 +145,11 @@ def test_a_block_of_rows_equals_the_textbooks_update() -> None:
     n, m = 9, 3
     P, H, y, R = covariance(n), RNG.standard_normal((m, n)), RNG.standard_normal(m), covariance(m)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
-    found, dx = P.copy(), np.zeros(n)
-    assert kalman.take_block(found, H, R, y.copy(), dx, np.empty((m, m)), np.empty((m, m)), np.empty((m, n)))
-    assert np.abs(found - (np.eye(n) - K @ H) @ P).max() < 1e-12
+    duplicate, dx = P.copy(), np.zeros(n)
+    assert kalman.take_block(
+        duplicate, H, R, y.copy(), dx, np.empty((m, m)), np.empty((m, m)), np.empty((m, n))
+    )
+    assert np.abs(duplicate - (np.eye(n) - K @ H) @ P).max() < 1e-12
     assert np.abs(dx - K @ y).max() < 1e-12
 
 
@@ -160,19 +162,19 @@ def test_the_bounded_covariance_is_that_of_the_thesis() -> None:
     middle = np.block([[R, np.zeros((m, n))], [np.zeros((n, m)), -(gamma**2) * np.eye(n)]])
     literal = P - P @ stacked.T @ np.linalg.inv(middle + stacked @ P @ stacked.T) @ stacked @ P
     inverse = np.linalg.inv(np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H - np.eye(n) / gamma**2)
-    found = np.linalg.inv(np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H)
+    result = np.linalg.inv(np.linalg.inv(P) + H.T @ np.linalg.inv(R) @ H)
     work = [np.empty((n, n)) for _ in range(3)]
-    assert kalman.bound_worst_case(found, gamma**2, *work)
-    assert np.abs(found - literal).max() < 1e-12
-    assert np.abs(found - inverse).max() < 1e-12
+    assert kalman.bound_worst_case(result, gamma**2, *work)
+    assert np.abs(result - literal).max() < 1e-12
+    assert np.abs(result - inverse).max() < 1e-12
 
 
 def test_a_bound_below_the_largest_eigenvalue_is_refused() -> None:
     P = covariance(5)
-    kept, largest = P.copy(), float(np.linalg.eigvalsh(P)[-1])
+    stored_duplicate, largest = P.copy(), float(np.linalg.eigvalsh(P)[-1])
     work = [np.empty((5, 5)) for _ in range(3)]
     assert not kalman.bound_worst_case(P, 0.99 * largest, *work)
-    assert np.array_equal(P, kept)
+    assert np.array_equal(P, stored_duplicate)
     assert kalman.bound_worst_case(P, 1.01 * largest, *work)
 
 

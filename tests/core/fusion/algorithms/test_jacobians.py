@@ -41,11 +41,11 @@ def test_the_prediction_of_the_extended_filters() -> None:
     extended_kalman.predict_state(
         x, P, w.copy(), dt, 0.0, 4, np.ones(n), np.zeros(n), turn, B, np.empty((4, 3)), np.empty((4, n))
     )
-    found = differences(turned, np.concatenate((q, b)))
+    result = differences(turned, np.concatenate((q, b)))
     assert np.abs(x[:4] - turned(np.concatenate((q, b)))).max() < 1e-15
-    assert np.abs(turn - found[:, :4]).max() < 1e-9
+    assert np.abs(turn - result[:, :4]).max() < 1e-9
     # eq 40 is the first two terms of a series in ωT
-    assert np.abs(B - found[:, 4:]).max() < 3e-6
+    assert np.abs(B - result[:, 4:]).max() < 3e-6
     F = np.eye(n)
     F[:4, :4], F[:4, 4:] = turn, B
     assert np.abs(P - 1e-3 * F @ F.T).max() < 1e-15
@@ -71,12 +71,12 @@ def test_the_derivative_of_a_measured_quaternion(kind: str) -> None:
     am = np.concatenate((rotate(conjugate(near), UP), rotate(conjugate(near), FIELD)))
     J = make(am)[1]
     # lengths are not part of these measurements
-    across = np.eye(6)
+    lateral = np.eye(6)
     if kind != "gd_disturbed":
-        across[:3, :3] -= np.outer(am[:3], am[:3])
-        across[3:, 3:] -= np.outer(am[3:], am[3:])
-    found = differences(lambda v: make(v)[0], am)
-    assert np.abs((found - J) @ across).max() < 1e-8
+        lateral[:3, :3] -= np.outer(am[:3], am[:3])
+        lateral[3:, 3:] -= np.outer(am[3:], am[3:])
+    result = differences(lambda v: make(v)[0], am)
+    assert np.abs((result - J) @ lateral).max() < 1e-8
 
 
 @pytest.mark.parametrize("kind", ["wahba", "gd_recursive"])
@@ -97,8 +97,8 @@ def test_the_derivative_of_a_measured_quaternion_at_a_fixed_dip(kind: str) -> No
         field = apply(FIELD, v[3:], q)
         if kind == "gd_recursive":
             return 2.0 * mu * (apply(UP, v[:3], q) + field - 2.0 * q)
-        both = field + q
-        return 0.25 * (apply(UP, v[:3], both) + both) - q
+        pair = field + q
+        return 0.25 * (apply(UP, v[:3], pair) + pair) - q
 
     assert np.abs(make(am) - y).max() < 1e-12
     assert np.abs(differences(make, am) - J).max() < 1e-9
@@ -122,11 +122,11 @@ def test_the_measurement_is_the_state_where_sensors_agree_with_it() -> None:
 def test_rows_of_an_error_in_sensor_axes() -> None:
     q = normalise(RNG.standard_normal(4))
     v = rotate(conjugate(q), FIELD)
-    found = differences(lambda e: rotate(conjugate(multiply(q, exp(e))), FIELD), np.zeros(3))
+    result = differences(lambda e: rotate(conjugate(multiply(q, exp(e))), FIELD), np.zeros(3))
     for i in range(3):
         h = np.empty(6)
         error_state._point_row(h, v, i)
-        assert np.abs(h[:3] - found[i]).max() < 1e-9
+        assert np.abs(h[:3] - result[i]).max() < 1e-9
 
 
 def test_principal_axes_are_those_of_numpy() -> None:
@@ -142,8 +142,8 @@ def test_the_vertical_moves_with_the_bias_as_its_covariance_says() -> None:
     g, w, dt = normalise(RNG.standard_normal(3)), np.array([1.0, -2.0, 0.5]), 1e-3
     E = np.empty((3, 3))
     direction._turn_back(w * dt, E)
-    found = differences(lambda b: rotate(conjugate(exp((w - b) * dt)), g), np.zeros(3))
+    result = differences(lambda b: rotate(conjugate(exp((w - b) * dt)), g), np.zeros(3))
     x, P = np.concatenate((g, np.zeros(3))), np.diag([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
     direction._advance_vertical(x, P, E, np.empty((3, 6)), dt, 0.0, 0.0)
     assert np.abs(x[:3] - E @ g).max() < 1e-15
-    assert np.abs(P[:3, 3:] - found).max() < 2.0 * dt**2
+    assert np.abs(P[:3, 3:] - result).max() < 2.0 * dt**2

@@ -1,4 +1,4 @@
-"""The particle swarm: what it finds, and that a stopped one goes on as if it had not stopped."""
+"""Particle swarm: optimum, and identical results after an interruption."""
 
 from __future__ import annotations
 
@@ -78,9 +78,9 @@ def test_a_swarm_read_back_after_any_iteration_goes_on_bit_for_bit(cost: object)
 
 def test_a_checkpoint_of_something_else_is_refused() -> None:
     content = write_swarm(Swarm.start(2), "a")
-    with pytest.raises(ParameterError) as other:
+    with pytest.raises(ParameterError) as other_error:
         read_swarm(content, "b")
-    assert other.value.code == "other_problem"
+    assert other_error.value.code == "other_problem"
     for broken in (b"", b"{}", b"[]", b'{"problem": "a", "swarm": {"low": []}}'):
         with pytest.raises(ParameterError) as caught:
             read_swarm(broken, "a")

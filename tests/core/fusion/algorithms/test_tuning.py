@@ -1,4 +1,4 @@
-"""Tuning: the numbers it may change, the split it insists on, and what it says of the result."""
+"""Tuning: variables, required split, and verdict."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ SHORT = SwarmRules(particles=4, iterations=3, rounds=2, random_rounds=1)
 
 
 def trial(name: str, seconds: float = 3.0, noise: float = 0.3) -> ReferenceTrial:
-    made = read_trial(name, trial_bytes(seconds))
+    result = read_trial(name, trial_bytes(seconds))
     rng = np.random.default_rng(len(name) + round(10 * seconds))
-    return replace(made, acc=made.acc + noise * rng.standard_normal(made.acc.shape))
+    return replace(result, acc=result.acc + noise * rng.standard_normal(result.acc.shape))
 
 
 def split() -> TrialSplit:
@@ -40,7 +40,7 @@ def split() -> TrialSplit:
 def tune(split: TrialSplit, stop_after: int | None = None, checkpoint: bytes | None = None) -> object:
     """The result, or the checkpoint after some iterations."""
     tuner = GainTuner("mahony_2008", split, scheme="fixed", rules=SHORT, seed=3, code_version="test")
-    kept: list[bytes] = []
+    stored_chunks: list[bytes] = []
 
     class Stopped(Exception):  # noqa: N818
         pass
@@ -48,14 +48,14 @@ def tune(split: TrialSplit, stop_after: int | None = None, checkpoint: bytes | N
     def keep(content: bytes, share: float, message: str) -> None:
         assert 0.0 < share <= 1.0
         assert "° on the trials it is fitted to" in message
-        kept.append(content)
-        if len(kept) == stop_after:
+        stored_chunks.append(content)
+        if len(stored_chunks) == stop_after:
             raise Stopped
 
     try:
         return tuner.run(keep, None if checkpoint is None else tuner.read_checkpoint(checkpoint))
     except Stopped:
-        return kept[-1]
+        return stored_chunks[-1]
 
 
 @pytest.mark.slow
@@ -72,8 +72,8 @@ def test_every_point_of_the_box_is_a_set_of_gains_that_its_class_takes(
         for point in (np.zeros(len(space)), np.ones(len(space)), rng.random(len(space))):
             gains = space.decode(point)
             assert type(gains) is algorithm.gains
-            again = space.encode(gains)
-            assert again == pytest.approx(point, abs=1e-3) or scheme == "three_levels"
+            second_content = space.encode(gains)
+            assert second_content == pytest.approx(point, abs=1e-3) or scheme == "three_levels"
             json.dumps(gains_to_json(gains), allow_nan=False)
 
 
@@ -93,8 +93,10 @@ def test_without_a_magnetometer_its_gains_and_thresholds_are_left_out() -> None:
     assert len(space) == 1
     robust = GainSpace(Nazarahari2021Gains(), magnetometer=False)
     assert len(robust) == len({"p0", "sigma_g", "sigma_a", "c_a", "s_a"})
-    both = TwoLevelGain(0.1, 0.02, acc=0.1, mag=0.1)
-    assert GainSpace(MahonyGains(both), magnetometer=False).params == MahonyGains(replace(both, mag=inf))
+    pair_of = TwoLevelGain(0.1, 0.02, acc=0.1, mag=0.1)
+    assert GainSpace(MahonyGains(pair_of), magnetometer=False).params == MahonyGains(
+        replace(pair_of, mag=inf)
+    )
     three = ThreeLevelGain(1.0, 2.0, 3.0, acc=(0.1, 0.2), mag=(0.1, 0.2))
     left = GainSpace(MahonyGains(three), magnetometer=False).params
     assert left == MahonyGains(replace(three, mag=(inf, inf)))
@@ -103,10 +105,10 @@ def test_without_a_magnetometer_its_gains_and_thresholds_are_left_out() -> None:
 def test_a_share_that_is_left_is_searched_near_one() -> None:
     space = GainSpace(Nazarahari2021Gains(), magnetometer=True)
     point = space.encode(Nazarahari2021Gains())
-    found = space.decode(point)
-    assert isinstance(found, Nazarahari2021Gains)
-    assert found.c_d == pytest.approx(0.99903, abs=1e-6)
-    assert found.gamma == inf
+    text = space.decode(point)
+    assert isinstance(text, Nazarahari2021Gains)
+    assert text.c_d == pytest.approx(0.99903, abs=1e-6)
+    assert text.gamma == inf
 
 
 def test_what_is_infinite_is_not_written() -> None:
@@ -169,25 +171,25 @@ def test_a_tuning_stopped_anywhere_and_resumed_ends_with_the_same_bits() -> None
         checkpoint = tune(halves, stop_after=stop)
         assert isinstance(checkpoint, bytes)
         assert tune(halves, checkpoint=checkpoint) == whole
-    other = TrialSplit(halves.train, (trial("other", 3.2),))
+    second = TrialSplit(halves.train, (trial("other", 3.2),))
     assert isinstance(checkpoint, bytes)
     with pytest.raises(ParameterError) as caught:
-        tune(other, checkpoint=checkpoint)
+        tune(second, checkpoint=checkpoint)
     assert caught.value.code == "other_problem"
 
 
 @pytest.mark.slow
 def test_the_result_says_on_what_and_whether_it_is_better() -> None:
-    found = tune(split())
-    assert isinstance(found, TuningResult)
-    assert set(found.trained) == {"one", "two"}
-    assert set(found.validated) == {"judge"}
-    before, after = (np.mean([pair[i] for pair in found.trained.values()]) for i in (0, 1))
-    assert after <= before
-    assert set(found.data) == {"one", "two", "judge"}
-    assert found.improved == found.verdict.startswith("Better")
-    assert (found.rules["particles"], found.seed, found.code_version) == (4, 3, "test")
-    assert json.loads(json.dumps(found.to_json(), allow_nan=False))["data_sha256"] == found.data_sha256
+    result = tune(split())
+    assert isinstance(result, TuningResult)
+    assert set(result.trained) == {"one", "two"}
+    assert set(result.validated) == {"judge"}
+    initial, final = (np.mean([pair[i] for pair in result.trained.values()]) for i in (0, 1))
+    assert final <= initial
+    assert set(result.data) == {"one", "two", "judge"}
+    assert result.improved == result.verdict.startswith("Better")
+    assert (result.rules["particles"], result.seed, result.code_version) == (4, 3, "test")
+    assert json.loads(json.dumps(result.to_json(), allow_nan=False))["data_sha256"] == result.data_sha256
 
 
 @pytest.mark.slow
@@ -197,7 +199,7 @@ def test_gains_that_only_fit_their_own_trials_are_not_recommended() -> None:
     noisy = replace(noisy, acc=noisy.acc + np.where(noisy.moving, 8.0, 0.0)[:, None])
     calm = trial("calm", 20.0, noise=0.0)
     drifting = replace(calm, gyr=calm.gyr + np.where(calm.moving, 0.02, 0.0)[:, None])
-    found = tune(TrialSplit((noisy,), (drifting,)))
-    assert isinstance(found, TuningResult)
-    assert not found.improved
-    assert "Keep the gains it began with." in found.verdict
+    result = tune(TrialSplit((noisy,), (drifting,)))
+    assert isinstance(result, TuningResult)
+    assert not result.improved
+    assert "Keep the gains it began with." in result.verdict

@@ -1,4 +1,4 @@
-"""Where tuning looks: every gain as printed lies within the range of its kind."""
+"""Printed gains lie within the tuning range of their type."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The filter's derivatives against differences of its own loops."""
+"""Filter derivatives against finite differences of its loops."""
 
 from __future__ import annotations
 
@@ -80,8 +80,8 @@ def test_errors_grow_over_an_interval_as_written(first: int, size: int, rows: in
     for k in range(size):
         step = 1e-6
         (up, _), (down, _) = (propagate(x, s * step * eye[first + k]) for s in (1.0, -1.0))
-        before = eye[first + k, :3]
-        turned[:, k] = log(multiply(up[:4], conjugate(down[:4]))) / (2 * step) - before
+        initial = eye[first + k, :3]
+        turned[:, k] = log(multiply(up[:4], conjugate(down[:4]))) / (2 * step) - initial
         pushed[:, k] = (up[7:10] - down[7:10]) / (2 * step)
     part = slice(first, first + size)
     assert F[:3, part] == pytest.approx(turned, abs=1e-3 * max(np.abs(turned).max(), 1e-3))
@@ -96,9 +96,9 @@ def test_the_field_says_of_heading_iron_and_delay_what_is_written() -> None:
     n, step, eye = SAMPLES, 1e-6, np.eye(at.WITH_MAG)
 
     def level_field(error: Floats) -> Floats:
-        end, found = propagate(x, error)
-        iron = found[at.S_MAG_R : at.S_MAG_R + 9].reshape(3, 3) @ end[at.IRON + 1 : at.IRON + 4]
-        return np.asarray((found[at.S_MAG : at.S_MAG + 3] - iron) / n)
+        end, result = propagate(x, error)
+        iron = result[at.S_MAG_R : at.S_MAG_R + 9].reshape(3, 3) @ end[at.IRON + 1 : at.IRON + 4]
+        return np.asarray((result[at.S_MAG : at.S_MAG + 3] - iron) / n)
 
     def slope(column: int) -> Floats:
         up, down = (level_field(s * step * eye[column]) for s in (1.0, -1.0))

@@ -51,8 +51,10 @@ def rms_deg(e: Floats) -> Floats:
 def test_tilt_and_heading_are_the_true_ones_and_later_knowledge_helps(seed: int) -> None:
     sensor = moved(seed)
     live = rms_deg(find_errors(sensor, run_live(sensor)[0]))
-    both = smooth_orientations(sensor.gyr[:, None], sensor.acc[:, None], sensor.rate_hz, sensor.mag[:, None])
-    smoothed = rms_deg(find_errors(sensor, both.q[:, 0]))
+    joint_orientations = smooth_orientations(
+        sensor.gyr[:, None], sensor.acc[:, None], sensor.rate_hz, sensor.mag[:, None]
+    )
+    smoothed = rms_deg(find_errors(sensor, joint_orientations.q[:, 0]))
     assert live[:2].max() < 0.6
     assert live[2] < 1.2
     assert smoothed[:2].max() < 0.25
@@ -72,14 +74,14 @@ def test_the_field_does_not_tilt(field: bool) -> None:
 
 @pytest.mark.sweep
 def test_what_is_wrong_with_the_sensor_is_found_as_surely_as_stated() -> None:
-    found = []
+    result = []
     for seed in range(4):
         sensor = moved(seed, turning=4.0)
         estimates = run_live(sensor)[1].estimates
         assert estimates.mag_delay_s is not None
-        found.append(estimates)
+        result.append(estimates)
         assert estimates.mag_delay_s[0] == pytest.approx(sensor.faults.mag_delay_s, abs=0.0015)
-    bias = np.mean([e.gyro_bias[0] for e in found], axis=0)
+    bias = np.mean([e.gyro_bias[0] for e in result], axis=0)
     assert np.degrees(bias) == pytest.approx(np.degrees(SensorFaults().gyro_bias), abs=0.06)
 
 
@@ -100,27 +102,27 @@ def test_a_wrong_gyroscope_matrix_is_learnt_from_turns() -> None:
     gyr = omega @ (np.eye(3) + faults.gyro_matrix).T + 3.5e-3 * rng.normal(size=omega.shape)
     run = SelfCalibratingFilter(rate, magnetometer=True)
     run.advance(gyr[:, None], np.array(up)[:, None], np.array(north)[:, None])
-    found = np.diag(run.estimates.gyro_matrix[0])
-    assert found == pytest.approx(np.diag(faults.gyro_matrix), abs=0.0012)
+    diag = np.diag(run.estimates.gyro_matrix[0])
+    assert diag == pytest.approx(np.diag(faults.gyro_matrix), abs=0.0012)
     # another recording of the device, begun with what this one found
-    again = SelfCalibratingFilter(rate, magnetometer=True, gyro_matrix=run.estimates.gyro_matrix)
-    again.advance(gyr[:100, None], np.array(up)[:100, None], np.array(north)[:100, None])
-    assert np.diag(again.estimates.gyro_matrix[0]) == pytest.approx(found, abs=1e-4)
+    second = SelfCalibratingFilter(rate, magnetometer=True, gyro_matrix=run.estimates.gyro_matrix)
+    second.advance(gyr[:100, None], np.array(up)[:100, None], np.array(north)[:100, None])
+    assert np.diag(second.estimates.gyro_matrix[0]) == pytest.approx(diag, abs=1e-4)
 
 
 @pytest.mark.sweep
 def test_a_bias_that_comes_with_shaking_is_found_and_not_taken_for_tilt() -> None:
     """Some tenths of a degree a second while shaken; at rest nothing of it is seen."""
-    true, found = np.radians([0.03, -0.025, 0.02]), []
+    true, result = np.radians([0.03, -0.025, 0.02]), []
     for seed in range(3):
         faults = SensorFaults(shaken_bias=true, gyro_matrix=np.zeros((3, 3)))
         sensor = move_sensor(60.0, seed=seed, shaking_m=0.12, faults=faults)
         q, run = run_live(sensor)
-        found.append(run.estimates.shaken_bias[0])
-        off, part = found[-1] - true, slice(at.SHAKEN, at.SHAKEN + 3)
+        result.append(run.estimates.shaken_bias[0])
+        off, part = result[-1] - true, slice(at.SHAKEN, at.SHAKEN + 3)
         assert off @ np.linalg.solve(run._P[0, part, part], off) < 11.3  # 99 % of three
         assert rms_deg(find_errors(sensor, q))[:2].max() < 0.6
-    assert np.linalg.norm(np.mean(found, axis=0) - true) < 0.5 * np.linalg.norm(true)
+    assert np.linalg.norm(np.mean(result, axis=0) - true) < 0.5 * np.linalg.norm(true)
 
 
 def test_the_field_of_another_region_is_not_taken_for_iron_or_heading() -> None:
@@ -146,13 +148,13 @@ def test_the_heading_of_the_start_is_as_sure_as_its_noisy_field_and_a_rest_avera
     sensors, rng, level = 40, np.random.default_rng(0), np.zeros((2000, 40, 3))
     mag = NORTH + MAG_NOISE * np.sqrt(100.0) * rng.normal(size=level.shape)
     run = SelfCalibratingFilter(100.0, sensors, magnetometer=True)
-    found = []
+    result = []
     for part in (slice(0, 60), slice(60, 2000)):
         q = run.advance(level[part], level[part] + [0.0, 0.0, GRAVITY_MPS2], mag[part])[-1]
         sd = np.sqrt(run.estimates.orientation_covariance[:, 2, 2])
-        found.append((np.sqrt(np.mean(log(q)[:, 2] ** 2)), np.mean(sd)))
-    assert found[0][0] == pytest.approx(found[0][1], rel=0.4)
-    assert found[1][0] < min(found[1][1], 0.6 * found[0][0])
+        result.append((np.sqrt(np.mean(log(q)[:, 2] ** 2)), np.mean(sd)))
+    assert result[0][0] == pytest.approx(result[0][1], rel=0.4)
+    assert result[1][0] < min(result[1][1], 0.6 * result[0][0])
 
 
 @pytest.mark.sweep
@@ -200,20 +202,20 @@ def test_sensors_together_are_each_as_alone() -> None:
     sensors = [moved(seed) for seed in range(3)]
     gyr, acc, mag = (np.stack([getattr(s, k)[:2000] for s in sensors], axis=1) for k in ("gyr", "acc", "mag"))
     together = SelfCalibratingFilter(100.0, 3, magnetometer=True).advance(gyr, acc, mag)
-    both = smooth_orientations(gyr, acc, 100.0, mag)
+    joint_orientations = smooth_orientations(gyr, acc, 100.0, mag)
     for k, sensor in enumerate(sensors):
-        alone, _ = run_live(
+        separate, _ = run_live(
             MovingSensor(
                 100.0, sensor.gyr[:2000], sensor.acc[:2000], sensor.mag[:2000], sensor.q, sensor.faults
             )
         )
-        assert np.array_equal(together[:, k], alone)
+        assert np.array_equal(together[:, k], separate)
         single = smooth_orientations(gyr[:, k : k + 1], acc[:, k : k + 1], 100.0, mag[:, k : k + 1])
-        assert np.array_equal(both.q[:, k], single.q[:, 0])
+        assert np.array_equal(joint_orientations.q[:, k], single.q[:, 0])
 
 
 def test_no_doubt_is_hidden() -> None:
-    """Tilt and heading lie where the covariance says they do with 95 %, at nearly as many moments."""
+    """Tilt and heading are within the stated 95 % at nearly as many moments."""
     for seed in range(3):
         sensor = moved(seed)
         run = SelfCalibratingFilter(sensor.rate_hz, magnetometer=True)

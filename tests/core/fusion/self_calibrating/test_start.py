@@ -58,8 +58,8 @@ def measured(n: int, rate: float = 0.0) -> tuple[Floats, Floats, Floats]:
     return rotate(conjugate(q), np.array([0.0, 0.0, rate])), up, field
 
 
-def level(found: Start, acc: Floats) -> Floats:
-    return np.asarray(found.turn_to_world(acc / np.linalg.norm(acc)))
+def level(result: Start, acc: Floats) -> Floats:
+    return np.asarray(result.turn_to_world(acc / np.linalg.norm(acc)))
 
 
 @pytest.mark.parametrize(
@@ -80,31 +80,31 @@ def test_it_is_over_sooner_at_rest_than_in_motion_and_level_and_to_the_north(
     rate: float, lasts_s: float
 ) -> None:
     gyr, acc, mag = measured(301, rate)
-    found = Start()
-    over = [found.take(*signals) for signals in zip(gyr, acc, mag, strict=True)]
+    start_state = Start()
+    over = [start_state.take(*signals) for signals in zip(gyr, acc, mag, strict=True)]
     assert over.index(True) + 1 == round(lasts_s * RATE)
-    found = Start()
+    start_state = Start()
     for i in range(round(lasts_s * RATE)):
-        found.take(gyr[i], acc[i], mag[i])
-    assert level(found, acc[i]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
-    assert found.turn_to_world(mag[i]) / 40.0 == pytest.approx(NORTH, abs=1e-8)
-    assert found.x[at.NORM] == pytest.approx(40.0)
-    assert found.x[at.NORTH : at.NORTH + 3] == pytest.approx(NORTH, abs=1e-8)
-    assert found.counters[at.C_START] == -1
+        start_state.take(gyr[i], acc[i], mag[i])
+    assert level(start_state, acc[i]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert start_state.turn_to_world(mag[i]) / 40.0 == pytest.approx(NORTH, abs=1e-8)
+    assert start_state.x[at.NORM] == pytest.approx(40.0)
+    assert start_state.x[at.NORTH : at.NORTH + 3] == pytest.approx(NORTH, abs=1e-8)
+    assert start_state.counters[at.C_START] == -1
 
 
 def test_a_push_is_motion_as_a_turn_is() -> None:
     gyr, acc, mag = measured(60)
     acc[20] += [0.6, 0.0, 0.0]
-    found = Start()
-    assert not any(found.take(*signals) for signals in zip(gyr, acc, mag, strict=True))
-    assert found.x[at.MOVED] == 1.0
+    start_state = Start()
+    assert not any(start_state.take(*signals) for signals in zip(gyr, acc, mag, strict=True))
+    assert start_state.x[at.MOVED] == 1.0
 
 
 def test_how_sure_a_start_at_rest_is() -> None:
-    found = Start()
-    found.find(*measured(100))
-    var = np.diag(found.P)
+    start_state = Start()
+    start_state.find(*measured(100))
+    var = np.diag(start_state.P)
     noise = MAG_NOISE**2 / START_S
     assert var[at.TILT : at.TILT + 2] == pytest.approx(START_TILT**2)
     assert var[at.TILT + 2] == pytest.approx(noise / NORTH[1] ** 2)
@@ -114,35 +114,37 @@ def test_how_sure_a_start_at_rest_is() -> None:
     assert var[at.FIELD : at.FIELD + 3] == pytest.approx(region + LEAST_FIELD**2)
     assert var[at.REGION : at.REGION + 3] == pytest.approx(region + np.array([0.0, noise, noise]))
     # the field that was read is place and region together: what one has more the other has less
-    assert np.diag(found.P[at.FIELD : at.FIELD + 3, at.REGION : at.REGION + 3]) == pytest.approx(-region)
-    assert np.array_equal(found.P, found.P.T)
-    assert np.linalg.eigvalsh(found.P).min() > -1e-15
-    assert found.x[at.GRAVITY + at.SHIFT] == GRAVITY
+    assert np.diag(start_state.P[at.FIELD : at.FIELD + 3, at.REGION : at.REGION + 3]) == pytest.approx(
+        -region
+    )
+    assert np.array_equal(start_state.P, start_state.P.T)
+    assert np.linalg.eigvalsh(start_state.P).min() > -1e-15
+    assert start_state.x[at.GRAVITY + at.SHIFT] == GRAVITY
     # iron is judged from the orientation in which the field was read
-    assert found.x[at.START_R : at.START_R + 9].reshape(3, 3) @ found.x[at.START_R : at.START_R + 9].reshape(
-        3, 3
-    ).T == pytest.approx(np.eye(3), abs=1e-9)
+    assert start_state.x[at.START_R : at.START_R + 9].reshape(3, 3) @ start_state.x[
+        at.START_R : at.START_R + 9
+    ].reshape(3, 3).T == pytest.approx(np.eye(3), abs=1e-9)
 
 
 def test_in_motion_all_is_four_times_less_sure_and_without_a_field_the_heading_is_a_definition() -> None:
     moving, still = Start(magnetometer=False), Start(magnetometer=False)
     still.find(*measured(400)[:2], np.zeros((0, 3)))
     moving.find(*measured(400, 0.5)[:2], np.zeros((0, 3)))
-    for found, k in ((still, 1.0), (moving, START_MOVING**2)):
-        var = np.diag(found.P)
+    for result, k in ((still, 1.0), (moving, START_MOVING**2)):
+        var = np.diag(result.P)
         assert var[at.TILT] == pytest.approx(k * START_TILT**2)
         assert var[at.TILT + 2] == pytest.approx(k * START_HEADING**2)
-        assert not found.x[at.NORTH : at.NORTH + 3].any()
+        assert not result.x[at.NORTH : at.NORTH + 3].any()
     assert np.diag(moving.P)[at.SPEED] == pytest.approx(START_MOVING**2 * np.diag(still.P)[at.SPEED])
 
 
 def test_of_a_whole_recording_it_is_seen_from_the_first_sample() -> None:
     gyr, acc, mag = measured(400, 0.5)
-    found = Start()
-    found.find(gyr, acc, mag)
-    assert level(found, acc[0]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
-    assert found.turn_to_world(mag[0]) / 40.0 == pytest.approx(NORTH, abs=1e-8)
-    assert (found.counters[at.C_SEEN], found.counters[at.C_START]) == (0, -1)
+    start_state = Start()
+    start_state.find(gyr, acc, mag)
+    assert level(start_state, acc[0]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    assert start_state.turn_to_world(mag[0]) / 40.0 == pytest.approx(NORTH, abs=1e-8)
+    assert (start_state.counters[at.C_SEEN], start_state.counters[at.C_START]) == (0, -1)
 
 
 def test_lost_samples_are_passed_over_and_a_recording_may_be_shorter_than_a_start() -> None:
@@ -150,9 +152,9 @@ def test_lost_samples_are_passed_over_and_a_recording_may_be_shorter_than_a_star
     for x in (gyr, acc):
         x[:5] = 0.0
         x[7] = np.nan
-    found = Start()
-    found.find(gyr, acc, mag)
-    assert level(found, acc[50]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
+    start_state = Start()
+    start_state.find(gyr, acc, mag)
+    assert level(start_state, acc[50]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)
     short = Start()
     short.find(*(x[20:30] for x in (gyr, acc, mag)))
     assert level(short, acc[20]) == pytest.approx([0.0, 0.0, 1.0], abs=1e-9)

@@ -1,4 +1,4 @@
-"""Rising from a chair and sitting down: what lies before, between and after."""
+"""Rising and sitting down: before, between and after."""
 
 from __future__ import annotations
 
@@ -21,9 +21,14 @@ T = np.arange(101) / 10.0
 RISE, DOWN = ChairChange("sit_to_stand", 2.0, 4.0), ChairChange("stand_to_sit", 6.0, 8.0)
 
 
-def at(found: SeatMotion, time_s: float) -> tuple[float, float, float, float]:
+def at(result: SeatMotion, time_s: float) -> tuple[float, float, float, float]:
     k = round(10.0 * time_s)
-    return float(found.drop[k]), float(found.back[k]), float(found.pelvis_rad[k]), float(found.chest_rad[k])
+    return (
+        float(result.drop[k]),
+        float(result.back[k]),
+        float(result.pelvis_rad[k]),
+        float(result.chest_rad[k]),
+    )
 
 
 SITS = pytest.approx((DROP, BACK, SEATED_TILT, SEATED_CHEST), abs=1e-12)
@@ -31,7 +36,7 @@ STANDS = pytest.approx((0.0, 0.0, 0.0, 0.0), abs=1e-12)
 
 
 def test_who_rises_first_sits_before_and_stands_after() -> None:
-    found = sit_and_rise(T, (RISE, DOWN))
+    transitions = sit_and_rise(T, (RISE, DOWN))
     for time_s, expected in (
         (0.0, SITS),
         (2.0, SITS),
@@ -40,18 +45,20 @@ def test_who_rises_first_sits_before_and_stands_after() -> None:
         (8.0, SITS),
         (10.0, SITS),
     ):
-        assert at(found, time_s) == expected, time_s
+        assert at(transitions, time_s) == expected, time_s
 
 
 def test_who_sits_down_first_stands_before() -> None:
-    found = sit_and_rise(T, (DOWN,))
-    assert at(found, 0.0) == STANDS
-    assert at(found, 9.0) == SITS
+    transitions = sit_and_rise(T, (DOWN,))
+    assert at(transitions, 0.0) == STANDS
+    assert at(transitions, 9.0) == SITS
 
 
 def test_without_a_change_nothing_is_added() -> None:
-    found = sit_and_rise(T, ())
-    assert not any(x.any() for x in (found.drop, found.back, found.pelvis_rad, found.chest_rad))
+    transitions = sit_and_rise(T, ())
+    assert not any(
+        x.any() for x in (transitions.drop, transitions.back, transitions.pelvis_rad, transitions.chest_rad)
+    )
 
 
 def test_halfway_the_trunk_leans_most_and_further_than_the_pelvis() -> None:

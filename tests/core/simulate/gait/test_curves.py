@@ -1,4 +1,4 @@
-"""Fourier series of a gait cycle, and what is known of the curves they hold."""
+"""Fourier series of gait cycles, and known properties of the curves."""
 
 from __future__ import annotations
 

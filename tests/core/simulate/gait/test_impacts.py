@@ -111,11 +111,11 @@ def test_shocks_do_not_depend_on_the_grid(move_steadily: Callable[[float, float]
 def test_hard_steps_leave_the_range_of_a_real_sensor_and_are_cut_off() -> None:
     """docs/science/simulation.md, "Impacts": at 200 Hz and twice the impact 0.3 % of the foot's samples."""
     script = (Stand(3.0), Straight(24.0, 0.72, 0.5), Stand(3.0))
-    made = simulate(script, FAST, 3, RecordingSetup(rate_hz=200.0, impacts=True))
-    device = next(d for d, s in made.recording.segments.items() if s == "foot_r")
-    acc = made.recording.streams[device].acc
-    clipped = made.clipped["foot_r"]
+    result = simulate(script, FAST, 3, RecordingSetup(rate_hz=200.0, impacts=True))
+    device = next(d for d, s in result.recording.segments.items() if s == "foot_r")
+    acc = result.recording.streams[device].acc
+    clipped = result.clipped["foot_r"]
     assert 0.0005 < clipped.mean() < 0.01
     assert np.abs(acc).max() == 16.0 * GRAVITY
-    assert np.abs(made.ideal["foot_r"].acc).max() > 16.0 * GRAVITY
+    assert np.abs(result.ideal["foot_r"].acc).max() > 16.0 * GRAVITY
     assert (np.abs(acc[~clipped]) < 16.0 * GRAVITY).all()

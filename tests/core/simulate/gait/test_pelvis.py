@@ -55,8 +55,8 @@ def test_weight_is_on_both_feet_in_standing_and_on_the_other_one_in_swing() -> N
         assert share[-1] == pytest.approx(0.5)
         x = TIMINGS[side]
         assert np.interp(0.5 * (x.release + x.contact), T, share) == pytest.approx(0.0, abs=1e-9)
-        other = TIMINGS["left" if side == "right" else "right"]
-        assert np.interp(0.5 * (other.release + other.contact), T, share) == pytest.approx(1.0)
+        second = TIMINGS["left" if side == "right" else "right"]
+        assert np.interp(0.5 * (second.release + second.contact), T, share) == pytest.approx(1.0)
         assert np.interp(x.release, T, share) == pytest.approx(0.0, abs=0.02)
 
 
@@ -68,12 +68,12 @@ def test_it_stands_between_the_feet_and_walks_ahead_of_their_middle() -> None:
     last = [WALK.footprints[s][-1] for s in SIDES]
     assert xy[-1] == pytest.approx([np.mean([f.x_m for f in last]), 0.0], abs=1e-3)
     steps = WALK.steps[2:5]
-    for before, step in zip(WALK.steps[1:4], steps, strict=True):
-        middle = 0.5 * (before.x_m + step.x_m)
+    for initial, step in zip(WALK.steps[1:4], steps, strict=True):
+        middle = 0.5 * (initial.x_m + step.x_m)
         assert np.interp(step.time_s, T, xy[:, 0]) - middle == pytest.approx(WALKER.forward_m, abs=0.01)
         # over the stance foot halfway through the step
         side = np.interp(step.time_s - 0.25, T, xy[:, 1])
-        assert 0.0 < side / before.y_m < WALKER.lateral
+        assert 0.0 < side / initial.y_m < WALKER.lateral
 
 
 def test_without_amplitude_it_is_only_tilted_and_a_hike_lifts_its_own_side() -> None:

@@ -50,7 +50,7 @@ def test_on_the_floor_the_foot_is_where_stance_has_it() -> None:
 
 
 def test_it_leaves_and_lands_without_a_jump_of_its_speed() -> None:
-    """What a sample changes of the speed is half as much on a grid twice as fine."""
+    """Velocity changes per sample halve on a grid twice as fine."""
     _, fine = swing(walk(WALKER, 2.0 * RATE))
     for coarse_x, fine_x in ((FOUND.ankle, fine.ankle), (FOUND.pitch, fine.pitch), (FOUND.roll, fine.roll)):
         change, half = (
@@ -83,7 +83,7 @@ def test_the_sole_clears_the_floor_in_mid_swing() -> None:
 
 
 def test_the_free_leg_is_kept_from_straightening() -> None:
-    """Where its targets would have it longer: the foot of somebody whose pelvis is higher."""
+    """Limits the swing leg where its targets would be too long, with a higher pelvis."""
     limit = float(leg_reach(WALKER.anatomy, SideGait().knee_min_rad + np.radians(1.0)))
     _, high = swing(MOTION, -0.04)
     hip = MOTION.p["pelvis"] + [0.0, 0.0, 0.04] + rotate(MOTION.q["pelvis"], hip_offset(WALKER, "left"))
@@ -96,29 +96,29 @@ def test_the_free_leg_is_kept_from_straightening() -> None:
 
 @pytest.mark.parametrize("clearance_m", [0.025, 0.03])
 def test_who_lifts_the_foot_clears_the_floor_by_so_much(clearance_m: float) -> None:
-    stance, found = swing(
+    stance, result = swing(
         walk(replace(WALKER, sides=dict.fromkeys(SIDES, SideGait(clearance_m=clearance_m))))
     )
     low = stance.sole.lowest(
-        found.ankle, foot_orientation(found.heading, found.pitch, found.roll), found.pitch
+        result.ankle, foot_orientation(result.heading, result.pitch, result.roll), result.pitch
     )
     release, contact = stance.timing.release[0], stance.timing.contact[0]
     u = (MOTION.t_s - release) / (contact - release)
     middle = (u > 0.25) & (u < 0.77)
     spare = low[middle] - clearance_m * np.minimum(1.0, 3.0 * bump(u[middle]))
     assert -1e-9 <= spare.min() < 0.01
-    assert found.lifts[0] > FOUND.lifts[0] + 0.5 * (clearance_m - SideGait().clearance_m)
+    assert result.lifts[0] > FOUND.lifts[0] + 0.5 * (clearance_m - SideGait().clearance_m)
 
 
 def test_no_foot_is_lifted_by_more_than_a_tenth_of_the_leg() -> None:
-    _, found = swing(walk(replace(WALKER, sides=dict.fromkeys(SIDES, SideGait(clearance_m=0.5)))))
+    _, result = swing(walk(replace(WALKER, sides=dict.fromkeys(SIDES, SideGait(clearance_m=0.5)))))
     most = MOST_LIFT * (WALKER.anatomy.thigh + WALKER.anatomy.shank)
-    assert found.lifts == pytest.approx((most, most))
+    assert result.lifts == pytest.approx((most, most))
 
 
 def test_who_does_not_land_rising_pitches_up_before() -> None:
-    _, other = swing(walk(replace(WALKER, lands_rising=False)))
+    _, second = swing(walk(replace(WALKER, lands_rising=False)))
     i = 1
     last = (MOTION.t_s > STANCE.timing.contact[i] - 0.12) & (MOTION.t_s < STANCE.timing.contact[i])
     assert (np.diff(FOUND.pitch[last]) > 0.0).all()
-    assert (np.diff(other.pitch[last]) < 0.0).any()
+    assert (np.diff(second.pitch[last]) < 0.0).any()

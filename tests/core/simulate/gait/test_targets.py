@@ -37,7 +37,7 @@ def test_a_healthy_leg_has_the_healthy_curves(
 
 
 def added(target: Callable[[SideGait, Floats], Floats], gait: SideGait) -> Floats:
-    """What a gait adds to the healthy target (100,), in degrees."""
+    """Difference of a gait from the healthy target (100,), degrees."""
     return np.asarray((target(gait, PHASE) - target(SideGait(), PHASE)) / DEGREE)
 
 
@@ -79,6 +79,6 @@ def test_a_leg_that_swings_round_is_abducted_in_swing_alone() -> None:
 
 
 def test_an_ankle_that_hangs_is_smaller_and_lower_in_swing() -> None:
-    found = ankle_dorsiflexion(SideGait(ankle_factor=0.4, ankle_swing_rad=-6.0 * DEGREE), PHASE)
-    assert found[20:50] == pytest.approx(0.4 * ANKLE_DORSIFLEXION(PHASE)[20:50], abs=1e-12)
-    assert found[85] == pytest.approx(0.4 * ANKLE_DORSIFLEXION(PHASE)[85] - 6.0 * DEGREE)
+    result = ankle_dorsiflexion(SideGait(ankle_factor=0.4, ankle_swing_rad=-6.0 * DEGREE), PHASE)
+    assert result[20:50] == pytest.approx(0.4 * ANKLE_DORSIFLEXION(PHASE)[20:50], abs=1e-12)
+    assert result[85] == pytest.approx(0.4 * ANKLE_DORSIFLEXION(PHASE)[85] - 6.0 * DEGREE)

@@ -85,9 +85,9 @@ def test_standing_between_two_contacts_is_told_and_does_not_stretch_the_support(
     assert STOP.stands[1] == pytest.approx((4.5, 7.5))
     for side in SIDES:
         x = foot_timing(STOP, WALKER, side)
-        before = np.concatenate(([-np.inf], x.contact[:-1]))
+        initial = np.concatenate(([-np.inf], x.contact[:-1]))
         assert x.paused.tolist() == [
-            any(b <= start < c for start, _ in STOP.stands) for b, c in zip(before, x.contact, strict=True)
+            any(b <= start < c for start, _ in STOP.stands) for b, c in zip(initial, x.contact, strict=True)
         ]
         assert x.paused.sum() == 2
         assert x.release - x.opposite == pytest.approx(SideGait().double_support * 2 * STEP_S)

@@ -95,10 +95,10 @@ def test_names_of_keys_and_tokens_lose_the_space_around_them() -> None:
 
 
 def test_keys_alone_need_both_proofs() -> None:
-    both = {"password": "x", "code": "123456"}
-    assert takes(schemas.KeysOnly, on=True, **both)
-    for missing in both:
-        assert not takes(schemas.KeysOnly, on=True, **{k: v for k, v in both.items() if k != missing})
+    pair = {"password": "x", "code": "123456"}
+    assert takes(schemas.KeysOnly, on=True, **pair)
+    for missing in pair:
+        assert not takes(schemas.KeysOnly, on=True, **{k: v for k, v in pair.items() if k != missing})
     assert not takes(schemas.CodeProof, code="")
 
 

@@ -16,9 +16,9 @@ BODY = {"name": "Matlab", "scopes": ["read", "upload"], "days": 7, "password": P
 
 async def test_a_token_is_shown_once_and_listed_to_its_owner_alone(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
-        made = await client.post(TOKENS, json=BODY)
-        assert made.status_code == 201, made.text
-        token = made.json()
+        response = await client.post(TOKENS, json=BODY)
+        assert response.status_code == 201, response.text
+        token = response.json()
         assert token.pop("token").startswith("sgt_")
         assert (token["name"], sorted(token["scopes"]), token["used_at"]) == (
             "Matlab",
@@ -30,9 +30,9 @@ async def test_a_token_is_shown_once_and_listed_to_its_owner_alone(clinic: Clini
         newer = (await client.post(TOKENS, json=BODY | {"name": "R"})).json()
         assert [t["name"] for t in (await client.get(TOKENS)).json()] == ["R", "Matlab"]
         assert (await client.get(TOKENS)).json()[1] == token
-    async with clinic.client("viewer") as other:
-        assert (await other.get(TOKENS)).json() == []
-        assert (await other.delete(f"{TOKENS}/{token['id']}")).status_code == 404
+    async with clinic.client("viewer") as other_client:
+        assert (await other_client.get(TOKENS)).json() == []
+        assert (await other_client.delete(f"{TOKENS}/{token['id']}")).status_code == 404
     async with clinic.client("clinician") as client:
         assert (await client.delete(f"{TOKENS}/{token['id']}")).status_code == 204
         assert [t["id"] for t in (await client.get(TOKENS)).json()] == [newer["id"]]

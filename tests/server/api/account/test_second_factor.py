@@ -22,19 +22,19 @@ async def test_it_is_set_up_proved_and_removed_with_a_code(clinic: Clinic) -> No
 
         assert await ask("", password="wrong") == (403, "wrong_password")
         assert await ask("/remove", code="123456") == (403, "wrong_code")
-        made = (await client.post(HERE, json={"password": PASSWORD})).json()
-        assert set(made) == {"secret", "address", "picture"}
+        payload = (await client.post(HERE, json={"password": PASSWORD})).json()
+        assert set(payload) == {"secret", "address", "picture"}
         # not proved yet: nobody is asked for it
-        async with clinic.client() as other:
+        async with clinic.client() as other_client:
             person = {"name": "clinician", "password": PASSWORD}
-            assert (await other.post("/api/v1/sign-in", json=person)).status_code == 200
+            assert (await other_client.post("/api/v1/sign-in", json=person)).status_code == 200
         assert await ask("/confirm", code="000000") == (403, "wrong_code")
-        proved = await client.post(f"{HERE}/confirm", json={"code": pyotp.TOTP(made["secret"]).now()})
+        proved = await client.post(f"{HERE}/confirm", json={"code": pyotp.TOTP(payload["secret"]).now()})
         codes = proved.json()["codes"].split("\n")
         assert (proved.status_code, len(codes)) == (200, 10)
-        async with clinic.client() as other:
-            asked = await other.post("/api/v1/sign-in", json=person)
-            assert (asked.status_code, asked.json()["code"]) == (401, "code_needed")
+        async with clinic.client() as other_client:
+            requested_response = await other_client.post("/api/v1/sign-in", json=person)
+            assert (requested_response.status_code, requested_response.json()["code"]) == (401, "code_needed")
         assert (await ask("", password=PASSWORD))[0] == 409
         assert await ask("/remove", code="000000") == (403, "wrong_code")
         assert await ask("/remove", code=codes[0]) == (204, "")

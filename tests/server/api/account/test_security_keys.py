@@ -19,8 +19,8 @@ async def test_a_key_is_added_listed_and_removed_with_password_and_code(clinic: 
     clinic.app.state.throttle = Throttle()
     user, key_file = clinic.user("clinician"), clinic.settings.second_factor_key
     with clinic.db.write() as c:
-        made = second_factor.begin(c, key_file, user, "clinician")
-        codes = second_factor.confirm(c, key_file, user, pyotp.TOTP(made.secret).now())
+        session = second_factor.begin(c, key_file, user, "clinician")
+        codes = second_factor.confirm(c, key_file, user, pyotp.TOTP(session.secret).now())
     async with clinic.client(headers={"Cookie": f"sid={clinic.token('clinician')}"}) as client:
         client.base_url = httpx.URL(HERE)
 
@@ -36,9 +36,9 @@ async def test_a_key_is_added_listed_and_removed_with_password_and_code(clinic: 
         assert await ask("POST", options, password=PASSWORD, code="000000") == (403, "wrong_code")
         assert await ask("PUT", "/second-factor/keys-only", on=True, **both()) == (409, "no_key")
         assert await ask("PUT", "/second-factor/keys-only", on=False, **both()) == (204, "")
-        asked = (await client.post(ACCOUNT + options, json=both())).json()["options"]
+        requested_body = (await client.post(ACCOUNT + options, json=both())).json()["options"]
         key = SoftKey()
-        body = {"name": " blue ", "key": key.create(asked, HERE)}
+        body = {"name": " blue ", "key": key.create(requested_body, HERE)}
         added = await client.post(f"{ACCOUNT}/security-keys", json=body)
         assert added.status_code == 201, added.text
         assert (added.json()["name"], added.json()["host"], added.json()["used_at"]) == (
@@ -46,8 +46,11 @@ async def test_a_key_is_added_listed_and_removed_with_password_and_code(clinic: 
             "localhost",
             None,
         )
-        again = await client.post(f"{ACCOUNT}/security-keys", json=body)
-        assert (again.status_code, again.json()["code"]) == (403, "key_refused")  # answered once
+        second_response = await client.post(f"{ACCOUNT}/security-keys", json=body)
+        assert (second_response.status_code, second_response.json()["code"]) == (
+            403,
+            "key_refused",
+        )  # answered once
         assert (await client.get(f"{ACCOUNT}/security-keys")).json() == [added.json()]
         assert await ask("PUT", "/second-factor/keys-only", on=True, **both()) == (204, "")
         with clinic.db.read() as c:

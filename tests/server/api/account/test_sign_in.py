@@ -53,13 +53,13 @@ async def test_guessing_a_password_is_stopped_and_says_when_to_try_again(clinic:
 
 async def test_a_form_signs_in_without_scripts_and_never_leads_elsewhere(clinic: Clinic) -> None:
     clinic.user("viewer")
-    for wanted, got in (
+    for expected, got in (
         ("/jobs", "/jobs"),
         ("//evil.example", "/patients"),
         ("https://evil.example", "/patients"),
     ):
         async with clinic.client() as client:
-            form = {"name": "viewer", "password": PASSWORD, "next": wanted}
+            form = {"name": "viewer", "password": PASSWORD, "next": expected}
             answer = await client.post("/api/v1/sign-in", data=form)
         assert answer.status_code == 303
         assert answer.headers["location"] == got
@@ -79,12 +79,12 @@ async def test_set_up_makes_the_first_administrator_once(tmp_path: Path) -> None
             assert answer.status_code == 201
             account = (await client.get("/api/v1/account")).json()
             assert (account["name"], account["role"]) == ("anna", "admin")
-            again = await client.post(f"/api/v1/set-up/{token}", json=body)
-            assert (again.status_code, again.json()["code"]) == (404, "link_not_valid")
+            second_response = await client.post(f"/api/v1/set-up/{token}", json=body)
+            assert (second_response.status_code, second_response.json()["code"]) == (404, "link_not_valid")
             assert (await client.post("/api/v1/sign-in", json=body)).status_code == 200
         with clinic.db.write() as c:
-            other = one_time.issue_set_up(c)
-            assert not one_time.is_valid(c, other, "set_up")
+            second = one_time.issue_set_up(c)
+            assert not one_time.is_valid(c, second, "set_up")
 
 
 async def test_web_servers_with_a_shared_key_issue_one_set_up_address(
@@ -98,11 +98,11 @@ async def test_web_servers_with_a_shared_key_issue_one_set_up_address(
 
         token = issue(b"key of both")
         assert issue(b"key of both") == token
-        other = issue(b"another key")
-        assert other != token
+        second = issue(b"another key")
+        assert second != token
         with clinic.db.read() as c:
             assert not one_time.is_valid(c, token, "set_up")
-            assert one_time.is_valid(c, other, "set_up")
+            assert one_time.is_valid(c, second, "set_up")
         monkeypatch.setattr(one_time, "LIFE", dt.timedelta(seconds=-1))
         expired = issue(b"key of both")
         assert issue(b"key of both") != expired
@@ -133,7 +133,7 @@ async def test_a_one_time_address_expires(clinic: Clinic) -> None:
 async def test_changing_the_password_needs_the_present_one_and_ends_other_sign_ins(clinic: Clinic) -> None:
     clinic.user("admin")  # without one no account may change
     clinic.user("viewer", "edda")
-    other = clinic.token("viewer", "edda")
+    second = clinic.token("viewer", "edda")
     mine = clinic.token("viewer", "edda")
     async with clinic.client(headers={"Cookie": f"sid={mine}"}) as client:
         path = "/api/v1/account/password"
@@ -142,7 +142,7 @@ async def test_changing_the_password_needs_the_present_one_and_ends_other_sign_i
         right = await client.post(path, json={"current": PASSWORD, "password": "another good one"})
         assert right.status_code == 204
         assert (await client.get("/api/v1/account")).status_code == 200
-    assert clinic.app.state.logins.find(other) is None
+    assert clinic.app.state.logins.find(second) is None
 
 
 async def test_who_is_signed_in_is_told_what_this_person_may_do(clinic: Clinic) -> None:
@@ -154,7 +154,7 @@ async def test_who_is_signed_in_is_told_what_this_person_may_do(clinic: Clinic) 
             "assistant",
             "assistant",
         )
-        assert account["actions"] == sorted(a.value for a, who in POLICY.items() if Role.ASSISTANT in who)
+        assert account["actions"] == sorted(a.value for a, user in POLICY.items() if Role.ASSISTANT in user)
         for language, status in (("de", 204), (None, 204), ("fr", 422)):
             chosen = await client.put("/api/v1/account/language", json={"language": language})
             assert chosen.status_code == status, language

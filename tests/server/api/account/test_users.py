@@ -38,10 +38,10 @@ async def test_the_last_administrator_cannot_be_lost(tmp_path: Path) -> None:
             for change in ({"role": "viewer"}, {"active": False}):
                 answer = await client.patch(f"/api/v1/users/{admin}", json=change)
                 assert (answer.status_code, answer.json()["code"]) == (409, "last_administrator")
-            taken = await client.post(
+            response = await client.post(
                 "/api/v1/users", json={"name": "admin", "role": "viewer", "password": PASSWORD}
             )
-            assert (taken.status_code, taken.json()["code"]) == (409, "name_taken")
+            assert (response.status_code, response.json()["code"]) == (409, "name_taken")
         with clinic.db.read() as c:
             assert accounts.get(c, admin).role == Role.ADMIN
             assert c.execute(select(func.count()).select_from(login_session)).scalar_one() == 1
@@ -50,9 +50,9 @@ async def test_the_last_administrator_cannot_be_lost(tmp_path: Path) -> None:
 async def test_accounts_are_added_changed_and_listed_without_a_trace_of_the_password(clinic: Clinic) -> None:
     new = {"name": "frieda", "role": "viewer", "password": PASSWORD}
     async with clinic.client("admin") as client:
-        made = await client.post("/api/v1/users", json=new)
-        assert made.status_code == 201
-        user = made.json()
+        response = await client.post("/api/v1/users", json=new)
+        assert response.status_code == 201
+        user = response.json()
         assert set(user) == {"id", "name", "display_name", "role", "active", "created_at"}
         assert (user["name"], user["role"], user["active"]) == ("frieda", "viewer", True)
         changed = await client.patch(f"/api/v1/users/{user['id']}", json={"display_name": "Frieda F."})

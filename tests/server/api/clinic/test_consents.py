@@ -1,4 +1,4 @@
-"""What a patient agreed to, over the API."""
+"""Consents of a patient over the API."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ API = "/api/v1"
 async def test_consent_is_given_listed_and_withdrawn_once_by_who_may(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         patient = patients.create(c, None, code="C-1").id
-    here = f"{API}/patients/{patient}/consents"
+    address = f"{API}/patients/{patient}/consents"
     body = {"purpose": "research", "evidence": "form 12", "given_on": "2026-01-31"}
     async with clinic.client("clinician") as client:
-        first = await client.post(here, json=body)
+        first = await client.post(address, json=body)
         assert first.status_code == 201, first.text
         assert {k: first.json()[k] for k in body} == body
-        again = await client.post(here, json=body)
-        assert again.status_code == 409
+        second_response = await client.post(address, json=body)
+        assert second_response.status_code == 409
         withdraw = f"{API}/consents/{first.json()['id']}/withdraw"
         gone = await client.post(withdraw)
         assert gone.json()["withdrawn_on"] == now().date().isoformat()
         assert (await client.post(withdraw)).status_code == 409
-        anew = await client.post(here, json=body | {"evidence": "form 13"})
-        assert (await client.get(here)).json() == [anew.json(), gone.json()]
+        anew = await client.post(address, json=body | {"evidence": "form 13"})
+        assert (await client.get(address)).json() == [anew.json(), gone.json()]
         for wrong in ({"purpose": "fun"}, {"evidence": " "}, {"given_on": "31.1.2026"}):
-            assert (await client.post(here, json=body | wrong)).status_code == 422, wrong
+            assert (await client.post(address, json=body | wrong)).status_code == 422, wrong
         assert (await client.get(f"{API}/patients/{'0' * 32}/consents")).status_code == 404
         assert (await client.post(f"{API}/consents/{'0' * 32}/withdraw")).status_code == 404
     async with clinic.client("viewer") as client:
-        assert len((await client.get(here)).json()) == 2
-        assert (await client.post(here, json=body)).status_code == 403
+        assert len((await client.get(address)).json()) == 2
+        assert (await client.post(address, json=body)).status_code == 403
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
     assert [r["user_name"] for r in rows if r["action"] == "consents.opened"] == ["viewer", "clinician"]

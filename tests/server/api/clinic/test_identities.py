@@ -1,4 +1,4 @@
-"""Who a patient is: shown and changed by whom, and where the name never stands."""
+"""Identities of patients: access, changes, and absence of names elsewhere."""
 
 from __future__ import annotations
 
@@ -60,10 +60,10 @@ async def test_written_read_changed_and_taken_away(ward: tuple[Clinic, str, str]
     here = f"{API}/patients/{pid}/identity"
     async with clinic.client("clinician") as client:
         assert (await client.get(here)).json() == dict.fromkeys([*WHO, "changed_at"])
-        made = await client.patch(here, json=WHO)
-        assert made.status_code == 200, made.text
-        assert {name: made.json()[name] for name in WHO} == WHO
-        assert (await client.get(here)).json() == made.json()
+        response = await client.patch(here, json=WHO)
+        assert response.status_code == 200, response.text
+        assert {name: response.json()[name] for name in WHO} == WHO
+        assert (await client.get(here)).json() == response.json()
         page = await client.get(f"/patients/{pid}/identity")
         assert f'value="Erika {CANARY}"' in page.text
         assert page.headers["cache-control"] == "no-store"
@@ -122,10 +122,10 @@ async def test_the_name_stands_on_paper_only_where_it_was_ticked(ward: tuple[Cli
             document = signed_reports.read_document(c, clinic.app.state.blobs, signed, name)
             assert CANARY.encode() not in document
     async with clinic.client("viewer") as client:
-        shown = await client.get(here, params={"named": "true"})
-        assert shown.status_code == 200
-        assert CANARY not in shown.text
-        assert "With the patient's name" not in shown.text
+        visible_response = await client.get(here, params={"named": "true"})
+        assert visible_response.status_code == 200
+        assert CANARY not in visible_response.text
+        assert "With the patient's name" not in visible_response.text
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
         assert [r["action"] for r in rows].count("identity.printed") == 1

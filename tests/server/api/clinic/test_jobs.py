@@ -28,9 +28,9 @@ async def queued_job(clinic: Clinic, code: str) -> str:
         await client.put(f"{API}/sessions/{session}/files/a.csv", content=b"t\n")
         answer = await client.post(f"{API}/sessions/{session}/inspections")
         assert answer.status_code == 202
-        again = await client.post(f"{API}/sessions/{session}/inspections")
+        second_response = await client.post(f"{API}/sessions/{session}/inspections")
     job: str = answer.json()["id"]
-    assert again.json()["id"] == job
+    assert second_response.json()["id"] == job
     return job
 
 
@@ -49,7 +49,7 @@ async def test_a_session_without_files_has_nothing_to_inspect_or_analyse(clinic:
 @pytest.mark.slow
 async def test_every_change_is_pushed_and_the_stream_ends_with_the_job(clinic: Clinic) -> None:
     job = await queued_job(clinic, "pushed")
-    seen: list[tuple[str, str | None]] = []
+    observations: list[tuple[str, str | None]] = []
     async with serve(clinic.app) as port:
         cookies = {"sid": clinic.token("viewer")}
         async with httpx.AsyncClient(base_url=f"http://127.0.0.1:{port}", cookies=cookies) as client:
@@ -60,7 +60,7 @@ async def test_every_change_is_pushed_and_the_stream_ends_with_the_job(clinic: C
                     if not line.startswith("data: "):
                         continue
                     view = json.loads(line.removeprefix("data: "))
-                    seen.append((view["state"], view["stage"]))
+                    observations.append((view["state"], view["stage"]))
                     queue = clinic.app.state.queue
                     if view["state"] == "queued":
                         while claim is None or claim.job_id != job:
@@ -69,9 +69,9 @@ async def test_every_change_is_pushed_and_the_stream_ends_with_the_job(clinic: C
                     elif view["stage"] == "reading":
                         queue.fail(claim, "no_format", "No format fits; give a manifest.")
             listed = (await client.get(f"{API}/jobs/{job}")).json()
-    assert seen[0] == ("queued", None)
-    assert ("running", "reading") in seen
-    assert seen[-1] == ("failed", "reading")
+    assert observations[0] == ("queued", None)
+    assert ("running", "reading") in observations
+    assert observations[-1] == ("failed", "reading")
     assert listed["error_code"] == "no_format"
     assert listed["patient_code"] == "pushed"
 
@@ -95,9 +95,9 @@ async def test_watching_does_not_write_audit_rows(clinic: Clinic) -> None:
     job = await queued_job(clinic, "quiet")
     async with clinic.client("admin") as client:
         await client.post(f"{API}/jobs/{job}/cancel")
-        before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
+        initial_body = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
         await client.get(f"{API}/jobs/{job}/events")
-        assert (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"] == before
+        assert (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"] == initial_body
 
 
 async def test_a_stream_ends_with_the_sign_in_however_busy_the_job_is(

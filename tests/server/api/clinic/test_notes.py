@@ -1,4 +1,4 @@
-"""Dated notes about a patient: listed by day, removed by who may."""
+"""Dated notes about a patient: order and permission to delete."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ API = "/api/v1"
 
 async def test_a_note_is_removed_by_who_wrote_it_or_an_administrator(clinic: Clinic) -> None:
     with clinic.db.write() as c:
-        other = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
+        other_id = accounts.create(c, "colleague", None, Role.CLINICIAN, "x").id
         patient = patients.create(c, None, code="V-NOTES").id
-        colleague = Identity(other, "colleague", "", Role.CLINICIAN, "")
+        colleague = Identity(other_id, "colleague", "", Role.CLINICIAN, "")
         theirs = notes.add(c, colleague, patient, "Written by a colleague.").id
     async with clinic.client("clinician") as client:
         mine = (await client.post(f"{API}/patients/{patient}/notes", json={"content": "My own."})).json()[
@@ -46,18 +46,18 @@ async def test_notes_are_listed_by_day_with_their_author_and_each_look_is_a_row(
 ) -> None:
     with clinic.db.write() as c:
         patient = patients.create(c, None, code="N-LIST").id
-    here = f"{API}/patients/{patient}/notes"
+    address = f"{API}/patients/{patient}/notes"
     async with clinic.client("clinician") as client:
         today = now().date()
-        earlier = await client.post(here, json={"content": "Later typed.", "written_on": "2026-02-20"})
-        newest = await client.post(here, json={"content": "Of today."})
+        earlier = await client.post(address, json={"content": "Later typed.", "written_on": "2026-02-20"})
+        newest = await client.post(address, json={"content": "Of today."})
         assert (earlier.status_code, newest.status_code) == (201, 201)
         assert dt.date.fromisoformat(newest.json()["written_on"]) - today <= dt.timedelta(days=1)
-        listed = (await client.get(here)).json()
+        listed = (await client.get(address)).json()
         assert listed == [newest.json(), earlier.json()]
         assert {n["by"] for n in listed} == {"clinician"}
         for wrong in ({"content": " \n"}, {"content": "x", "day": "2026-02-20"}, {}):
-            assert (await client.post(here, json=wrong)).status_code == 422, wrong
+            assert (await client.post(address, json=wrong)).status_code == 422, wrong
         nobody = f"{API}/patients/{'0' * 32}/notes"
         assert [
             (await client.get(nobody)).status_code,
@@ -65,8 +65,8 @@ async def test_notes_are_listed_by_day_with_their_author_and_each_look_is_a_row(
         ] == [404, 404]
         assert (await client.delete(f"{API}/notes/{'0' * 32}")).status_code == 404
     async with clinic.client("viewer") as client:
-        assert (await client.get(here)).json() == listed
-        assert (await client.post(here, json={"content": "x"})).status_code == 403
+        assert (await client.get(address)).json() == listed
+        assert (await client.post(address, json={"content": "x"})).status_code == 403
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
     looked = [r["user_name"] for r in rows if (r["action"], r["resource_id"]) == ("notes.opened", patient)]

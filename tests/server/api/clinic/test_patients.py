@@ -17,16 +17,16 @@ API = "/api/v1"
 async def test_a_patient_is_made_changed_found_and_deleted_with_everything(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         body = {"code": "P-0001", "sex": "female", "birth_year": 1960, "height_m": 1.68}
-        made = await client.post(f"{API}/patients", json=body)
-        assert made.status_code == 201
-        patient = made.json()
+        post = await client.post(f"{API}/patients", json=body)
+        assert post.status_code == 201
+        patient = post.json()
         assert {k: patient[k] for k in body} == body
         path = f"{API}/patients/{patient['id']}"
         changed = await client.patch(path, json={"note": "uses a stick", "height_m": None})
         assert changed.json() == patient | {"note": "uses a stick", "height_m": None}
         assert (await client.patch(path, json={"note": None})).json()["note"] == ""
-        found = await client.get(f"{API}/patients", params={"q": "p-00"})
-        assert [p["id"] for p in found.json()] == [patient["id"]]
+        response = await client.get(f"{API}/patients", params={"q": "p-00"})
+        assert [p["id"] for p in response.json()] == [patient["id"]]
         session = (await client.post(f"{path}/sessions", json={"title": "Barefoot"})).json()
         assert session["patient_code"] == "P-0001"
         stored = await client.put(f"{API}/sessions/{session['id']}/files/a.txt", content=b"some bytes")
@@ -46,26 +46,32 @@ async def test_codes_that_look_alike_belong_to_one_patient(clinic: Clinic) -> No
     async with clinic.client("clinician") as client:
         assert (await client.post(f"{API}/patients", json={"code": "RACE-1"})).status_code == 201
         for alike in ("race-1", "\uff32ace-1"):
-            again = await client.post(f"{API}/patients", json={"code": alike})
-            assert (again.status_code, again.json()["code"]) == (409, "code_taken"), alike
+            second_response = await client.post(f"{API}/patients", json={"code": alike})
+            assert (second_response.status_code, second_response.json()["code"]) == (409, "code_taken"), alike
         for hidden in ("RACE\u200b-1", "RACE\u202e-2"):
             assert (await client.post(f"{API}/patients", json={"code": hidden})).status_code == 422, hidden
-        other = (await client.post(f"{API}/patients", json={"code": "RACE-2"})).json()["id"]
-        assert (await client.patch(f"{API}/patients/{other}", json={"code": "race-2"})).status_code == 200
-        assert (await client.patch(f"{API}/patients/{other}", json={"code": "race-1"})).status_code == 409
-        turned = await client.patch(f"{API}/patients/{other}", json={"note": "left \u202e right"})
+        other_body = (await client.post(f"{API}/patients", json={"code": "RACE-2"})).json()["id"]
+        assert (
+            await client.patch(f"{API}/patients/{other_body}", json={"code": "race-2"})
+        ).status_code == 200
+        assert (
+            await client.patch(f"{API}/patients/{other_body}", json={"code": "race-1"})
+        ).status_code == 409
+        turned = await client.patch(f"{API}/patients/{other_body}", json={"note": "left \u202e right"})
         assert turned.status_code == 422
-        assert (await client.patch(f"{API}/patients/{other}", json={"note": "a\x00b"})).status_code == 422
-        assert (await client.patch(f"{API}/patients/{other}", json={"note": "a\nb"})).status_code == 200
-        born = await client.patch(f"{API}/patients/{other}", json={"birth_year": 2200})
+        assert (
+            await client.patch(f"{API}/patients/{other_body}", json={"note": "a\x00b"})
+        ).status_code == 422
+        assert (await client.patch(f"{API}/patients/{other_body}", json={"note": "a\nb"})).status_code == 200
+        born = await client.patch(f"{API}/patients/{other_body}", json={"birth_year": 2200})
         assert born.status_code == 422
 
 
 async def test_a_code_belongs_to_one_patient(clinic: Clinic) -> None:
     async with clinic.client("clinician") as client:
         assert (await client.post(f"{API}/patients", json={"code": "Twice"})).status_code == 201
-        again = await client.post(f"{API}/patients", json={"code": "Twice"})
-    assert (again.status_code, again.json()["code"]) == (409, "code_taken")
+        second_response = await client.post(f"{API}/patients", json={"code": "Twice"})
+    assert (second_response.status_code, second_response.json()["code"]) == (409, "code_taken")
 
 
 @pytest.mark.parametrize(
@@ -86,13 +92,13 @@ async def test_a_code_belongs_to_one_patient(clinic: Clinic) -> None:
 )
 async def test_bad_fields_are_named_and_nothing_is_stored(clinic: Clinic, body: object) -> None:
     async with clinic.client("clinician") as client:
-        before = len((await client.get(f"{API}/patients")).json())
+        initial_count = len((await client.get(f"{API}/patients")).json())
         answer = await client.post(f"{API}/patients", json=body)
         assert answer.status_code == 422
         problem = answer.json()
         assert problem["code"] == "invalid_request"
         assert problem["errors"]
-        assert len((await client.get(f"{API}/patients")).json()) == before
+        assert len((await client.get(f"{API}/patients")).json()) == initial_count
 
 
 @pytest.mark.parametrize(

@@ -14,46 +14,53 @@ API = "/api/v1"
 async def test_a_session_is_opened_changed_and_removed_by_who_may(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         session = sessions.create(c, None, patients.create(c, None, code="SE-1").id, title="Walk").id
-    here = f"{API}/sessions/{session}"
+    address = f"{API}/sessions/{session}"
     async with clinic.client("clinician") as client:
-        before = (await client.get(here)).json()
-        assert (before["title"], before["state"], before["patient_code"]) == ("Walk", "empty", "SE-1")
-        changed = (await client.patch(here, json={"height_m": 1.7, "note": None})).json()
-        assert changed == before | {"height_m": 1.7, "note": ""}
-        assert (await client.patch(here, json={"title": ""})).status_code == 422
+        initial_body = (await client.get(address)).json()
+        assert (initial_body["title"], initial_body["state"], initial_body["patient_code"]) == (
+            "Walk",
+            "empty",
+            "SE-1",
+        )
+        changed = (await client.patch(address, json={"height_m": 1.7, "note": None})).json()
+        assert changed == initial_body | {"height_m": 1.7, "note": ""}
+        assert (await client.patch(address, json={"title": ""})).status_code == 422
         empty = [
-            await client.get(f"{here}/recording"),
-            await client.put(f"{here}/manifest", json={}),
-            await client.post(f"{here}/inspections"),
+            await client.get(f"{address}/recording"),
+            await client.put(f"{address}/manifest", json={}),
+            await client.post(f"{address}/inspections"),
         ]
         assert [(a.status_code, a.json()["code"]) for a in empty] == [
             (404, "not_found"), (409, "no_files"), (409, "no_files"),
         ]  # fmt: skip
     async with clinic.client("viewer") as client:
-        assert (await client.get(here)).json() == changed
-        assert (await client.patch(here, json={"title": "Run"})).status_code == 403
-        assert (await client.delete(here)).status_code == 403
+        assert (await client.get(address)).json() == changed
+        assert (await client.patch(address, json={"title": "Run"})).status_code == 403
+        assert (await client.delete(address)).status_code == 403
     async with clinic.client("admin") as client:
-        assert (await client.delete(here)).status_code == 204
-        assert [(await client.get(here)).status_code, (await client.delete(here)).status_code] == [404, 404]
+        assert (await client.delete(address)).status_code == 204
+        assert [(await client.get(address)).status_code, (await client.delete(address)).status_code] == [
+            404,
+            404,
+        ]
 
 
 async def test_files_are_described_and_looked_at_once_for_the_same_wish(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         session = sessions.create(c, None, patients.create(c, None, code="SE-2").id).id
-    here = f"{API}/sessions/{session}"
+    address = f"{API}/sessions/{session}"
     async with clinic.client("assistant") as client:
-        assert (await client.put(f"{here}/files/walk.txt", content=b"recording")).is_success
-        first, again = [await client.post(f"{here}/inspections") for _ in range(2)]
+        assert (await client.put(f"{address}/files/walk.txt", content=b"recording")).is_success
+        first, second = [await client.post(f"{address}/inspections") for _ in range(2)]
         assert (first.status_code, first.json()["kind"]) == (202, "inspect")
-        assert again.json()["id"] == first.json()["id"]
-        told = (await client.get(f"{here}/recording")).json()
-        assert [(f["name"], f["size"]) for f in told["files"]] == [("walk.txt", 9)]
-        assert (told["manifest"], told["session_id"]) == (None, session)
+        assert second.json()["id"] == first.json()["id"]
+        body = (await client.get(f"{address}/recording")).json()
+        assert [(f["name"], f["size"]) for f in body["files"]] == [("walk.txt", 9)]
+        assert (body["manifest"], body["session_id"]) == (None, session)
         mapped = {"sensors": {"A1": "pelvis"}}
-        assert (await client.put(f"{here}/manifest", json=mapped)).json()["manifest"]["sensors"] == mapped[
+        assert (await client.put(f"{address}/manifest", json=mapped)).json()["manifest"]["sensors"] == mapped[
             "sensors"
         ]
-        wrong = await client.put(f"{here}/manifest", json={"sensors": {"A1": "tail"}})
+        wrong = await client.put(f"{address}/manifest", json={"sensors": {"A1": "tail"}})
         assert wrong.status_code == 422
-        assert (await client.get(f"{here}/recording")).json()["manifest"]["sensors"] == mapped["sensors"]
+        assert (await client.get(f"{address}/recording")).json()["manifest"]["sensors"] == mapped["sensors"]

@@ -1,4 +1,4 @@
-"""The archive of a visit as it is downloaded."""
+"""Download of a visit's archive."""
 
 from __future__ import annotations
 

@@ -23,10 +23,10 @@ from sagittal.server.api.downloads.downloads import attachment, write_dispositio
     ],
 )
 def test_a_name_stands_twice_plain_and_whole(name: str, plain: str) -> None:
-    said = write_disposition(name)
-    assert said.isascii()
-    assert "\n" not in said
-    first, _, whole = said.partition("; filename*=UTF-8''")
+    disposition = write_disposition(name)
+    assert disposition.isascii()
+    assert "\n" not in disposition
+    first, _, whole = disposition.partition("; filename*=UTF-8''")
     assert first == f'attachment; filename="{plain}"'
     assert unquote(whole) == name
     assert not set(whole) & set("/ \"';")

@@ -1,4 +1,4 @@
-"""Exports over the API and on the page: asked for, written as the worker does, downloaded, offered anew."""
+"""Exports over the API and on the page: request, worker, download, renewal."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ API = "/api/v1"
 async def visit(clinic: Clinic, code: str) -> str:
     async with clinic.client("clinician") as client:
         patient = (await client.post(f"{API}/patients", json={"code": code})).json()["id"]
-        asked = {"title": "Walk", "performed_on": "2026-03-02"}
-        session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=asked)).json()["id"]
+        requests = {"title": "Walk", "performed_on": "2026-03-02"}
+        session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=requests)).json()["id"]
     analysed.finish(clinic, patient, session, analysed.files())
     return session
 
@@ -39,7 +39,7 @@ QUIET = Attempt(lambda stage, share, message=None: None, lambda content: None)
 
 
 def work(clinic: Clinic, session: str) -> None:
-    """What a worker and its child do with the next job, in this process."""
+    """Run the next job like a worker and its child, in this process."""
     state = clinic.app.state
     claim = state.queue.claim("tester", [EXPORT])
     with clinic.db.read() as c:
@@ -69,26 +69,28 @@ async def test_an_export_is_written_once_and_anew_after_an_edit(clinic: Clinic) 
             return list(csv.DictReader(io.StringIO(text)))
 
         assert (await offered())["csv"]["job"] is None
-        asked = await client.post(f"{path}/exports", json={"kind": "csv"})
-        assert (asked.status_code, asked.json()["kind"]) == (202, "export")
-        assert (await client.post(f"{path}/exports", json={"kind": "csv"})).json()["id"] == asked.json()["id"]
+        requested_response = await client.post(f"{path}/exports", json={"kind": "csv"})
+        assert (requested_response.status_code, requested_response.json()["kind"]) == (202, "export")
+        assert (await client.post(f"{path}/exports", json={"kind": "csv"})).json()[
+            "id"
+        ] == requested_response.json()["id"]
         assert 'job="' in (await client.get(f"/sessions/{session}/data")).text
         work(clinic, session)
-        before = await strides()
+        initial = await strides()
         page = (await client.get(f"/sessions/{session}/data")).text
         assert "Export for other programs" in page
         assert page.count((await offered())["csv"]["file"]) == 1, "not among the results, too"
 
-        counted = next(row for row in before if row["counted"] == "1")
-        edit = {"kind": "exclude_stride", "side": counted["side"], "reason": "stumbled"}
-        edit["time_s"] = (float(counted["start_s"]) + float(counted["end_s"])) / 2  # type: ignore[assignment]
+        item = next(row for row in initial if row["counted"] == "1")
+        edit = {"kind": "exclude_stride", "side": item["side"], "reason": "stumbled"}
+        edit["time_s"] = (float(item["start_s"]) + float(item["end_s"])) / 2  # type: ignore[assignment]
         async with clinic.client("clinician") as clinician:
             assert (await clinician.post(f"{path}/edits", json=edit)).status_code == 201
         assert (await offered())["csv"]["job"] is None, "the one before the edit is not offered"
         await client.post(f"{path}/exports", json={"kind": "csv"})
         work(clinic, session)
         left_out = [row["cycle"] for row in await strides() if row["excluded_reason"] == "manual:stumbled"]
-        assert left_out == [counted["cycle"]]
+        assert left_out == [item["cycle"]]
 
     async with clinic.client("assistant") as client:
         assert (await client.post(f"{path}/exports", json={"kind": "csv"})).status_code == 403

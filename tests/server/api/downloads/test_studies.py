@@ -1,4 +1,4 @@
-"""The tables of a study over the visits that somebody chose."""
+"""Study tables over selected visits."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
     first, second = await visit(clinic, "JANE-DOE"), await visit(clinic, "JOHN-DOE")
     async with clinic.client("clinician") as client:
         patient = (await client.get(f"{API}/sessions/{second}")).json()["patient_id"]
-        asked: dict[str, Any] = {"title": "Jane Doe", "performed_on": "2026-03-12", "note": "Jane"}
-        empty = (await client.post(f"{API}/patients/{patient}/sessions", json=asked)).json()["id"]
-        before = unpack(await client.get(f"{API}/study.zip"))
-        counted = next(row for row in rows(before["strides.csv"]) if not row["excluded_reason"])
-        edit = {"kind": "exclude_stride", "side": counted["side"], "reason": "Jane stumbled"}
-        edit["time_s"] = (float(counted["start_s"]) + float(counted["end_s"])) / 2  # type: ignore[assignment]
+        requested_fields: dict[str, Any] = {"title": "Jane Doe", "performed_on": "2026-03-12", "note": "Jane"}
+        empty = (await client.post(f"{API}/patients/{patient}/sessions", json=requested_fields)).json()["id"]
+        initial = unpack(await client.get(f"{API}/study.zip"))
+        item = next(row for row in rows(initial["strides.csv"]) if not row["excluded_reason"])
+        edit = {"kind": "exclude_stride", "side": item["side"], "reason": "Jane stumbled"}
+        edit["time_s"] = (float(item["start_s"]) + float(item["end_s"])) / 2  # type: ignore[assignment]
         (await client.post(f"{API}/sessions/{first}/edits", json=edit)).raise_for_status()
-        found = unpack(await client.get(f"{API}/study.zip"))
-        alone = unpack(await client.get(f"{API}/study.zip", params={"visit": [first]}))
+        result = unpack(await client.get(f"{API}/study.zip"))
+        single = unpack(await client.get(f"{API}/study.zip", params={"visit": [first]}))
         later = unpack(await client.get(f"{API}/study.zip", params={"since": "2026-03-12"}))
         page = (await client.get("/study", params={"q": "JANE", "protocol": "walk"})).text
         refused = [
@@ -60,27 +60,27 @@ async def test_the_tables_have_every_visit_as_it_counts_by_pseudonyms(clinic: Cl
     async with clinic.client("admin") as client:
         trail = (await client.get(f"{API}/audit", params={"limit": 1000})).json()
 
-    takes = rows(found["takes.csv"])
+    takes = rows(result["takes.csv"])
     assert len(takes) == 3
     assert sorted(t["error"] for t in takes) == ["", "", "no_analysis"]
     assert sorted(t["days_since_first"] for t in takes if t["sub"] == takes[-1]["sub"]) == ["0", "10"]
-    assert pq.read_table(io.BytesIO(found["takes.parquet"])).num_rows == 3
-    (failed,) = rows(found["failures.csv"])
+    assert pq.read_table(io.BytesIO(result["takes.parquet"])).num_rows == 3
+    (failed,) = rows(result["failures.csv"])
     assert failed["message"].startswith("This visit has no analysis")
-    for name, content in found.items():
+    for name, content in result.items():
         for secret in ("DOE", "Jane", "2026-03", first, second, empty):
             if name != "provenance.json" or secret != "2026-03":
                 assert secret.encode() not in content, (name, secret)
     # one visit has an edit: its stride does not count, and its figures are those without it
-    left_out = [r for r in rows(found["strides.csv"]) if r["excluded_reason"] == "manual"]
+    left_out = [r for r in rows(result["strides.csv"]) if r["excluded_reason"] == "manual"]
     assert len(left_out) == 1
     assert [t["edits"] for t in takes if t["take"] == left_out[0]["take"]] == ["1"]
-    assert len(rows(found["strides.csv"])) == len(rows(before["strides.csv"]))
-    assert {r["take"] for r in rows(alone["strides.csv"])} == {left_out[0]["take"]}
+    assert len(rows(result["strides.csv"])) == len(rows(initial["strides.csv"]))
+    assert {r["take"] for r in rows(single["strides.csv"])} == {left_out[0]["take"]}
     assert [t["error"] for t in rows(later["takes.csv"])] == ["no_analysis"]
-    made = json.loads(found["provenance.json"])
-    assert len(made["takes"]) == 3
-    assert len(made["analyses"]) == 2
+    document = json.loads(result["provenance.json"])
+    assert len(document["takes"]) == 3
+    assert len(document["analyses"]) == 2
     assert (page.count('name="visit"'), "JOHN-DOE" in page) == (1, False)
     assert [a.status_code for a in refused] == [409, 422, 422, 422, 409]
     about = [row["resource_id"] for row in trail if row["action"] == "study.exported"]

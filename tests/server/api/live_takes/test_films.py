@@ -88,17 +88,17 @@ async def test_a_film_stands_beside_its_take_aligned_though_pieces_came_twice_an
         await walk(v)
         assert (await camera.end()).json() == {"kept": True}
         assert (await camera.end()).json() == {"kept": True}
-        kept = (await v.http.get(f"/api/v1/sessions/{v.session}/video")).json()
+        stored_body = (await v.http.get(f"/api/v1/sessions/{v.session}/video")).json()
         whole = await v.http.get(f"/api/v1/sessions/{v.session}/video/content")
         part = await v.http.get(
             f"/api/v1/sessions/{v.session}/video/content", headers={"Range": "bytes=1000-1009"}
         )
         assert whole.content == b"".join(PIECES)
         assert (part.status_code, part.content) == (206, whole.content[1000:1010])
-        assert kept["offset_s"] == pytest.approx(LATE_US / 1e6, abs=0.001)
-        assert kept["media_type"] == "video/webm"
-        assert kept["name"].endswith(".webm")
-        assert kept["consent_by"]
+        assert stored_body["offset_s"] == pytest.approx(LATE_US / 1e6, abs=0.001)
+        assert stored_body["media_type"] == "video/webm"
+        assert stored_body["name"].endswith(".webm")
+        assert stored_body["consent_by"]
         assert not films.film_path(clinic.settings.live, v.take).exists()
 
 

@@ -1,4 +1,4 @@
-"""Live takes over the API: opened, paired by a code, commanded, closed; who may and who may not."""
+"""Live trials over the API: open, pair, command, close; permissions."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ async def test_a_code_joins_one_tablet_once(clinic: Clinic) -> None:
         assert (answer["take"], answer["socket"]) == (take["id"], "/api/v1/live")
         assert answer["session_title"] == "Live training"
         assert answer["patient_code"].startswith("L-")
-        again = await pairing(stranger, take["code"])
-        assert (again.status_code, again.json()["code"]) == (404, "code_not_valid")
+        repeat = await pairing(stranger, take["code"])
+        assert (repeat.status_code, repeat.json()["code"]) == (404, "code_not_valid")
         state = (await http.get(f"/api/v1/sessions/{session}/live")).json()
         assert (state["take"], state["state"], state["tablet"]) == (take["id"], "open", "none")
     with clinic.db.read() as c:
@@ -172,9 +172,9 @@ async def test_a_page_that_is_open_before_the_take_sees_every_state(clinic: Clin
                 await ws.send(frame(0))
                 assert (await heard(feed, "state", state="streaming"))["count"] == 1
             assert (await heard(feed, "state", tablet="lost"))["state"] == "streaming"
-            made = (await v.http.post(f"{v.api}/close")).json()
+            body = (await v.http.post(f"{v.api}/close")).json()
             over = await heard(feed, "state", state="closed")
-            assert over["recording"] == made["recording_id"] is not None
+            assert over["recording"] == body["recording_id"] is not None
 
 
 @pytest.mark.parametrize("repeated", [False, True])
@@ -192,9 +192,9 @@ async def test_start_and_end_of_a_test_become_the_recordings_unless_it_is_repeat
             await v.command("test", limits)
             if repeated:
                 await v.command("test", "repeat")
-        made = (await v.http.post(f"{v.api}/close")).json()
+        body = (await v.http.post(f"{v.api}/close")).json()
         with clinic.db.read() as c:
-            row = c.execute(select(recording.c.manifest).where(recording.c.id == made["recording_id"])).one()
+            row = c.execute(select(recording.c.manifest).where(recording.c.id == body["recording_id"])).one()
     assert row.manifest.get("test_limits") == (None if repeated else limits)
 
 

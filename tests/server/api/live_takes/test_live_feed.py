@@ -1,4 +1,4 @@
-"""The browsers' socket of a session: who may, what comes first, how it ends."""
+"""Live feed of a session: permissions, initial messages, closing."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ async def port(clinic: Clinic) -> AsyncIterator[int]:
 async def test_a_browser_hears_first_where_the_take_stands_and_then_what_happens(
     clinic: Clinic, port: int
 ) -> None:
-    async with visit(clinic, port) as v, v.feed() as page, v.feed() as other:
-        for one in (page, other):
+    async with visit(clinic, port) as v, v.feed() as page, v.feed() as other_feed:
+        for one in (page, other_feed):
             first = json.loads(await one.recv())
             assert (first["type"], first["take"], first["state"]) == ("state", v.take, "open")
         await v.http.post(f"{v.api}/close")
-        for one in (page, other):
+        for one in (page, other_feed):
             assert (await heard(one, "state", state="closed"))["take"] == v.take
     async with clinic.client("admin") as admin:
         rows = (await admin.get("/api/v1/audit")).json()

@@ -45,7 +45,7 @@ def events(answer: httpx.Response) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 async def visit(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) -> AsyncIterator[Visit]:
-    made = simulate(SCRIPT, seed=3)
+    simulation = simulate(SCRIPT, seed=3)
     async with open_clinic(tmp_path_factory.mktemp("visit")) as clinic:
         workers = Workers(clinic.settings)
         workers.start()
@@ -54,12 +54,12 @@ async def visit(tmp_path_factory: pytest.TempPathFactory, anyio_backend: str) ->
                 patient = (await client.post(f"{API}/patients", json={"code": CODE, "height_m": 1.75})).json()
                 session = (await client.post(f"{API}/patients/{patient['id']}/sessions", json={})).json()
                 this = Visit(clinic, session["id"])
-                for name, content in mt_files(made.recording, "walk", made.first_counter).items():
+                for name, content in mt_files(simulation.recording, "walk", simulation.first_counter).items():
                     stored = await client.put(f"{this.path}/files/{name}", content=content)
                     assert stored.status_code == 201
                 job = (await client.post(f"{this.path}/inspections")).json()
                 this.inspection = events(await client.get(f"{API}/jobs/{job['id']}/events"))
-                body = {"manifest": {"sensors": dict(made.recording.segments)}}
+                body = {"manifest": {"sensors": dict(simulation.recording.segments)}}
                 job = (await client.post(f"{this.path}/analyses", json=body)).json()
                 this.analysis = events(await client.get(f"{API}/jobs/{job['id']}/events"))
                 (made_first,) = (await client.get(f"{this.path}/analyses")).json()
@@ -82,17 +82,17 @@ async def test_progress_is_pushed_until_the_job_is_done(visit: Visit) -> None:
 @pytest.mark.slow
 async def test_what_was_found_is_in_the_recording(visit: Visit) -> None:
     async with visit.clinic.client("assistant") as client:
-        found = (await client.get(f"{visit.path}/recording")).json()
-    assert found["state"] == "ready"
-    assert len(found["files"]) == 7
-    assert len(found["inspection"]["devices"]) == 7
+        body = (await client.get(f"{visit.path}/recording")).json()
+    assert body["state"] == "ready"
+    assert len(body["files"]) == 7
+    assert len(body["inspection"]["devices"]) == 7
 
 
 async def test_the_report_says_what_was_measured(visit: Visit) -> None:
     async with visit.clinic.client("viewer") as client:
         report = (await client.get(f"{visit.path}/report")).json()
-        shown = (await client.get(f"{API}/sessions/{visit.session}")).json()
-    assert shown["state"] == "done"
+        visible_body = (await client.get(f"{API}/sessions/{visit.session}")).json()
+    assert visible_body["state"] == "done"
     assert report["problem"] is None
     stride_time = next(p for p in report["parameters"] if p["name"] == "stride_time_s")
     assert 0.9 < stride_time["left"]["value"] < 1.3
@@ -142,9 +142,9 @@ async def test_downloads_are_the_stored_bytes_and_never_name_the_patient(visit: 
 
 async def test_the_same_analysis_is_computed_once(visit: Visit) -> None:
     async with visit.clinic.client("clinician") as client:
-        again = (await client.post(f"{visit.path}/analyses", json={})).json()
-        assert again["id"] == visit.analysis[-1]["id"]
-        assert again["state"] == "done"
+        second_body = (await client.post(f"{visit.path}/analyses", json={})).json()
+        assert second_body["id"] == visit.analysis[-1]["id"]
+        assert second_body["state"] == "done"
         wrong = await client.post(f"{visit.path}/analyses", json={"manifest": {"sensors": {"x": "nose"}}})
         assert (wrong.status_code, wrong.headers["content-type"]) == (422, "application/problem+json")
 
@@ -163,9 +163,9 @@ async def test_opening_a_report_is_audited_once(visit: Visit) -> None:
             rows = (await client.get(f"{API}/audit", params={"limit": 1000})).json()
             return sum(r["action"] == "report.opened" for r in rows)
 
-        before = await count()
+        initial = await count()
         await client.get(f"{visit.path}/report")
-        assert await count() == before + 1
+        assert await count() == initial + 1
 
 
 @pytest.mark.slow
@@ -177,10 +177,10 @@ async def test_every_page_about_a_person_leaves_one_audit_row(visit: Visit) -> N
         for tab in ("", "/upload", "/timeline", "/kinematics", "/algorithms", "/data", "/print"):
             pages[f"/sessions/{visit.session}{tab}"] = visit.session
         for page, resource in pages.items():
-            before = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
+            initial_body = (await client.get(f"{API}/audit", params={"limit": 1})).json()[0]["seq"]
             assert (await client.get(page)).status_code == 200
             rows = (await client.get(f"{API}/audit", params={"limit": 5})).json()
-            new = [r for r in rows if r["seq"] > before]
+            new = [r for r in rows if r["seq"] > initial_body]
             assert [(r["resource_id"], r["user_name"]) for r in new] == [(resource, "admin")], page
 
 
@@ -220,11 +220,11 @@ async def test_another_estimator_runs_on_the_same_take_and_the_first_can_be_show
             last = events(await client.get(f"{API}/jobs/{job['id']}/events"))[-1]
             return last["state"], (await client.get(f"{visit.path}/report")).json()["estimator"]
 
-        state, other = await run({"poses": {"estimator": "l7s_3i"}})
-        assert (state, other["name"]) == ("done", "L7S-3I")
-        assert "estimated by the leg model" in other["estimated"]
-        state, again = await run({})
-        assert (state, again) == ("done", first)
+        state, other_result = await run({"poses": {"estimator": "l7s_3i"}})
+        assert (state, other_result["name"]) == ("done", "L7S-3I")
+        assert "estimated by the leg model" in other_result["estimated"]
+        state, second_result = await run({})
+        assert (state, second_result) == ("done", first)
         state, _ = await run({"poses": {"estimator": "guess"}})
         assert state == "failed"
         jobs = (await client.get(f"{API}/jobs")).json()
@@ -248,9 +248,11 @@ async def reference_of(visit: Visit, client: httpx.AsyncClient) -> bytes:
 
 async def compare(visit: Visit, client: httpx.AsyncClient, **body: Any) -> dict[str, Any]:
     """Run filters; the last event of the job."""
-    asked = await client.post(f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"], **body})
-    assert asked.status_code == 202
-    return events(await client.get(f"{API}/jobs/{asked.json()['id']}/events"))[-1]
+    requested_response = await client.post(
+        f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"], **body}
+    )
+    assert requested_response.status_code == 202
+    return events(await client.get(f"{API}/jobs/{requested_response.json()['id']}/events"))[-1]
 
 
 @pytest.mark.slow
@@ -270,14 +272,14 @@ async def test_filters_run_on_the_take_as_one_job_and_against_a_reference(visit:
         assert (await client.get(f"{API}/filter-runs/{run['id']}")).json() == run
         assert run["reference_name"] == "labor/optisch.csv"
         files = f"{API}/filter-runs/{run['id']}/files"
-        found = (await client.get(f"{files}/filters.json")).json()
-        own, mahony, wu = found["filters"]
+        body = (await client.get(f"{files}/filters.json")).json()
+        own, mahony, wu = body["filters"]
         assert (own["name"], own["label"], mahony["cost_us"] > 0.0) == (None, "Sagittal, as analysed", True)
         assert wu["to_median"] is None
         assert wu["label"] == "Wu2018 (reconstruction)"
         assert wu["told"][0]["code"] == "no_magnetometer"
-        assert found["reference"]["lag_s"] == pytest.approx(-2.0, abs=0.01)
-        assert all(s["total"] < 3.0 for s in found["reference"]["scores"])
+        assert body["reference"]["lag_s"] == pytest.approx(-2.0, abs=0.01)
+        assert all(s["total"] < 3.0 for s in body["reference"]["scores"])
         rows = list(csv.DictReader(io.StringIO((await client.get(f"{files}/reference.csv")).text)))
         assert {r["filter"] for r in rows} == {"Sagittal, as analysed", "Mahony2008"}
         page = await client.get(
@@ -316,8 +318,10 @@ async def test_a_reference_that_cannot_be_used_fails_the_job_with_a_reason(visit
 async def test_who_reads_results_sees_comparisons_and_only_who_analyses_asks_for_one(visit: Visit) -> None:
     for role, asks, reads in (("viewer", 403, 200), ("assistant", 403, 403)):
         async with visit.clinic.client(role) as client:
-            asked = await client.post(f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"]})
-            assert asked.status_code == asks
+            requested_response = await client.post(
+                f"{visit.path}/filter-runs", json={"filters": ["mahony_2008"]}
+            )
+            assert requested_response.status_code == asks
             assert (await client.get(f"{visit.path}/filter-runs")).status_code == reads
             page = await client.get(f"/sessions/{visit.session}/algorithms")
             assert page.status_code == reads

@@ -29,9 +29,9 @@ def _session(
 ) -> str:
     with clinic.db.write() as c:
         day = dt.date(2026, 3, 2) + dt.timedelta(days=days)
-        made = sessions.create(c, None, patient, performed_on=day, protocol=protocol).id
-    analysed.finish(clinic, patient, made, analysed.files(duration_s))
-    return made
+        result = sessions.create(c, None, patient, performed_on=day, protocol=protocol).id
+    analysed.finish(clinic, patient, result, analysed.files(duration_s))
+    return result
 
 
 @pytest.mark.slow
@@ -98,9 +98,9 @@ async def test_another_protocol_is_another_condition(clinic: Clinic) -> None:
     patient = _patient(clinic)
     walk, belt = _session(clinic, patient, 0), _session(clinic, patient, 7, protocol="treadmill")
     async with clinic.client("viewer") as client:
-        found = (await client.get(f"{API}/sessions/{belt}/compare/{walk}")).json()
-    assert not found["comparable"]
-    assert any("over ground, then treadmill" in caution for caution in found["cautions"])
+        body = (await client.get(f"{API}/sessions/{belt}/compare/{walk}")).json()
+    assert not body["comparable"]
+    assert any("over ground, then treadmill" in caution for caution in body["cautions"])
 
 
 async def test_sessions_of_two_people_or_one_session_are_not_compared(clinic: Clinic) -> None:
@@ -118,9 +118,9 @@ async def test_two_ticked_visits_lead_to_their_comparison_and_others_back(clinic
     patient = _patient(clinic)
     one, two = _session(clinic, patient, 0), _session(clinic, patient, 7)
     async with clinic.client("viewer") as client:
-        both = await client.get(f"/patients/{patient}/compare", params={"visit": [one, two]})
+        joint_response = await client.get(f"/patients/{patient}/compare", params={"visit": [one, two]})
         single = await client.get(f"/patients/{patient}/compare", params={"visit": [one]})
-    assert both.headers["location"] == f"/sessions/{one}/compare/{two}"
+    assert joint_response.headers["location"] == f"/sessions/{one}/compare/{two}"
     assert single.headers["location"] == f"/patients/{patient}"
 
 

@@ -14,14 +14,16 @@ async def test_every_estimator_is_listed_with_its_sensors_and_its_paper(clinic: 
     async with clinic.client("assistant") as client:
         answer = await client.get(PATH)
     assert answer.status_code == 200
-    told = {e["name"]: e for e in answer.json()}
-    assert list(told) == [e.name for e in ESTIMATORS]
-    for name, shown in told.items():
-        known = BY_NAME[name]
-        assert {frozenset(needed) for needed in shown["sensor_sets"]} == set(known.sets)
-        assert shown["title"] == known.choice
-        assert shown["paper"] == (known.paper and {"citation": known.paper.citation, "doi": known.paper.doi})
-    assert any(e["paper"] for e in told.values())
+    notices = {e["name"]: e for e in answer.json()}
+    assert list(notices) == [e.name for e in ESTIMATORS]
+    for name, view in notices.items():
+        reference = BY_NAME[name]
+        assert {frozenset(needed) for needed in view["sensor_sets"]} == set(reference.sets)
+        assert view["title"] == reference.choice
+        assert view["paper"] == (
+            reference.paper and {"citation": reference.paper.citation, "doi": reference.paper.doi}
+        )
+    assert any(e["paper"] for e in notices.values())
 
 
 async def test_a_stranger_is_not_told(clinic: Clinic) -> None:

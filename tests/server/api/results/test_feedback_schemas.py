@@ -1,4 +1,4 @@
-"""What a prescription over the wire may hold, and what it is without a word."""
+"""Prescription schemas: allowed fields and defaults."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_a_target_is_looked_up_unless_it_is_said() -> None:
 
 
 def test_without_feedback_there_is_a_reason_and_nothing_shared() -> None:
-    one, other = Feedback("no_take"), Feedback("no_take")
+    one, second = Feedback("no_take"), Feedback("no_take")
     one.rows.append({"n": 1})
-    assert other.rows == []
-    assert (other.reason, other.prescription, other.retention) == ("no_take", None, None)
+    assert second.rows == []
+    assert (second.reason, second.prescription, second.retention) == ("no_take", None, None)

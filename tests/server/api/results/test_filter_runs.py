@@ -33,7 +33,7 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
         patient = patients.create(c, None, code="FI-1").id
         session, empty = (sessions.create(c, None, patient).id for _ in range(2))
     done = analysed.finish(clinic, patient, session, analysed.files())
-    here = f"{API}/sessions/{session}/filter-runs"
+    address = f"{API}/sessions/{session}/filter-runs"
     async with clinic.client("clinician") as client:
         refused: tuple[dict[str, Any], ...] = (
             {"filters": []},
@@ -41,20 +41,20 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
             {"filters": ["mahony_2008"], "speed": 2},
         )
         for wrong in refused:
-            assert (await client.post(here, json=wrong)).status_code == 422, wrong
-        asked = {"filters": ["mahony_2008"]}
-        missing = await client.post(here, json=asked | {"reference": "none.sto"})
+            assert (await client.post(address, json=wrong)).status_code == 422, wrong
+        requests = {"filters": ["mahony_2008"]}
+        missing = await client.post(address, json=requests | {"reference": "none.sto"})
         assert missing.status_code == 404
-        assert (await client.post(f"{API}/sessions/{empty}/filter-runs", json=asked)).status_code == 404
-        first, again = [await client.post(here, json=asked) for _ in range(2)]
+        assert (await client.post(f"{API}/sessions/{empty}/filter-runs", json=requests)).status_code == 404
+        first, second = [await client.post(address, json=requests) for _ in range(2)]
         assert (first.status_code, first.json()["kind"]) == (202, COMPARE_FILTERS)
-        assert again.json()["id"] == first.json()["id"]
-        assert (await client.get(here)).json() == []
+        assert second.json()["id"] == first.json()["id"]
+        assert (await client.get(address)).json() == []
         state = clinic.app.state
         claim = state.queue.claim("test", [COMPARE_FILTERS])
         stored = {"filters.json": state.blobs.put(patient, b"{}")}
         assert state.queue.finish(claim, lambda c: filter_runs.publish(c, claim, {}, stored))
-        (run,) = (await client.get(here)).json()
+        (run,) = (await client.get(address)).json()
         assert (run["analysis_id"], run["session_id"], run["job_id"]) == (done, session, first.json()["id"])
         assert [(f["name"], f["size"]) for f in run["files"]] == [("filters.json", 2)]
         one = f"{API}/filter-runs/{run['id']}"
@@ -69,19 +69,19 @@ async def test_a_comparison_is_asked_for_once_and_read_with_its_files(clinic: Cl
 async def test_a_reference_is_kept_byte_for_byte_replaced_and_taken_away(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         session = sessions.create(c, None, patients.create(c, None, code="FI-2").id).id
-    here = f"{API}/sessions/{session}/references"
+    address = f"{API}/sessions/{session}/references"
     async with clinic.client("assistant") as client:
-        added = await client.put(f"{here}/a/optical ä.sto", content=REFERENCE)
+        added = await client.put(f"{address}/a/optical ä.sto", content=REFERENCE)
         assert added.status_code == 201, added.text
         assert (added.json()["name"], added.json()["size"]) == ("a/optical ä.sto", len(REFERENCE))
-        newer = await client.put(f"{here}/a/optical ä.sto", content=REFERENCE * 2)
+        newer = await client.put(f"{address}/a/optical ä.sto", content=REFERENCE * 2)
         assert newer.json()["sha256"] != added.json()["sha256"]
     async with clinic.client("viewer") as client:
-        assert (await client.get(here)).json() == [newer.json()]
-        file = await client.get(f"{here}/a/optical ä.sto")
+        assert (await client.get(address)).json() == [newer.json()]
+        file = await client.get(f"{address}/a/optical ä.sto")
         assert (file.content, file.headers["content-type"]) == (REFERENCE * 2, "application/octet-stream")
         assert 'filename="optical _.sto"' in file.headers["content-disposition"]
-        assert (await client.delete(f"{here}/a/optical ä.sto")).status_code == 403
+        assert (await client.delete(f"{address}/a/optical ä.sto")).status_code == 403
     async with clinic.client("assistant") as client:
-        assert (await client.delete(f"{here}/a/optical ä.sto")).status_code == 204
-        assert (await client.delete(f"{here}/a/optical ä.sto")).status_code == 404
+        assert (await client.delete(f"{address}/a/optical ä.sto")).status_code == 204
+        assert (await client.delete(f"{address}/a/optical ä.sto")).status_code == 404

@@ -37,9 +37,9 @@ def _numbers(clinic: Clinic, patient: str, name: str, side: str) -> Parameter:
 
 def _for_take(clinic: Clinic, session: str) -> tuple[Prescription, Baseline]:
     with clinic.db.read() as c:
-        found = prescriptions.for_take(c, clinic.app.state.reviewed, session)
-    assert found is not None
-    return found
+        result = prescriptions.for_take(c, clinic.app.state.reviewed, session)
+    assert result is not None
+    return result
 
 
 async def test_a_change_ends_the_old_prescription_and_keeps_it(clinic: Clinic) -> None:
@@ -59,8 +59,8 @@ async def test_a_change_ends_the_old_prescription_and_keeps_it(clinic: Clinic) -
     assert "Target: 62.0 ± 2.0\u202f%, entered" in listed[0]["words"]
     with clinic.db.read() as c:
         rows = c.execute(audit.select().where(audit.c.resource_id == patient).order_by(audit.c.seq)).all()
-    said = [(r.action, r.detail["parameter"]) for r in rows if r.action.startswith("prescription.")]
-    assert said == [
+    message = [(r.action, r.detail["parameter"]) for r in rows if r.action.startswith("prescription.")]
+    assert message == [
         ("prescription.written", "stance_pct"),
         ("prescription.ended", "stance_pct"),
         ("prescription.written", "stance_pct"),
@@ -70,11 +70,11 @@ async def test_a_change_ends_the_old_prescription_and_keeps_it(clinic: Clinic) -
 async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
     async with clinic.client("clinician") as client:
-        made = (await client.post(f"{API}/patients/{patient}/prescriptions", json=MANUAL)).json()
-        ended = await client.post(f"{API}/prescriptions/{made['id']}/end")
-        again = await client.post(f"{API}/prescriptions/{made['id']}/end")
+        body = (await client.post(f"{API}/patients/{patient}/prescriptions", json=MANUAL)).json()
+        ended = await client.post(f"{API}/prescriptions/{body['id']}/end")
+        second_response = await client.post(f"{API}/prescriptions/{body['id']}/end")
     assert ended.json()["ended_at"] is not None
-    assert (again.status_code, again.json()["code"]) == (409, "prescription_ended")
+    assert (second_response.status_code, second_response.json()["code"]) == (409, "prescription_ended")
     with clinic.db.read() as c:
         assert prescriptions.in_force(c, patient) is None
         session = feedback.visit(clinic, patient, 0)
@@ -122,14 +122,14 @@ async def test_targets_are_the_persons_own_numbers_or_a_norm_at_their_speed(clin
     async with clinic.client("viewer") as client:
         path = f"{API}/patients/{patient}/targets?parameter=stride_time_s&side=left"
         offers = {o["source"]: o for o in (await client.get(path)).json()}
-        both = {o["source"]: o for o in (await client.get(path.replace("&side=left", ""))).json()}
+        pair = {o["source"]: o for o in (await client.get(path.replace("&side=left", ""))).json()}
         stance = (await client.get(f"{API}/patients/{patient}/targets?parameter=stance_pct&side=left")).json()
         unknown = await client.get(f"{API}/patients/{patient}/targets?parameter=beauty")
     left = _numbers(clinic, patient, "stride_time_s", "left")
     assert [offers["own_baseline"][k] for k in ("mean", "sd")] == [left.mean, left.sd]
     assert offers["own_baseline"]["words"] == f"left side, {left.n} strides on 2 Mar 2026"
     assert "Enter mean and SD" in offers["manual"]["reason"]
-    assert "Choose the one that is" in both["own_better_side"]["reason"]
+    assert "Choose the one that is" in pair["own_better_side"]["reason"]
     norm = next(o for o in stance if o["source"] == "norm")
     assert 55.0 < norm["mean"] < 68.0, "contacts are those of a walkway"
     assert unknown.status_code == 422
@@ -144,8 +144,8 @@ async def test_the_better_side_is_a_target_for_the_other_one_only(clinic: Clinic
     async with clinic.client("viewer") as client:
         path = f"{API}/patients/{patient}/targets?parameter={parameter}&side="
         offers = [(await client.get(path + side)).json() for side in (worse, better)]
-    given, refused = (next(o for o in found if o["source"] == "own_better_side") for found in offers)
-    assert given["mean"] == means[better]
+    inputs, refused = (next(o for o in result if o["source"] == "own_better_side") for result in offers)
+    assert inputs["mean"] == means[better]
     assert refused["mean"] is None
     assert f"The {better} side is the better one" in refused["reason"]
 
@@ -174,20 +174,20 @@ async def test_a_prescribed_norm_has_its_numbers_and_its_people(clinic: Clinic) 
 
 async def test_a_take_gets_target_baseline_and_the_limit_of_the_other_side(clinic: Clinic) -> None:
     patient = feedback.person(clinic)
-    before = feedback.walked(clinic, patient, 0)
+    initial = feedback.walked(clinic, patient, 0)
     own = {"parameter": "stance_pct", "side": "left", "target": {"source": "own_baseline"}}
     async with clinic.client("clinician") as client:
         answer = await client.post(f"{API}/patients/{patient}/prescriptions", json=own)
         assert answer.status_code == 201, answer.text
-    given, baseline = _for_take(clinic, feedback.visit(clinic, patient, 7))
+    inputs, baseline = _for_take(clinic, feedback.visit(clinic, patient, 7))
     left = _numbers(clinic, patient, "stance_pct", "left")
-    assert (given.target.source, given.target.mean) == ("own_baseline", left.mean)
+    assert (inputs.target.source, inputs.target.mean) == ("own_baseline", left.mean)
     assert (baseline.mean, baseline.sd, baseline.n) == (left.mean, left.sd, left.n)
-    assert (baseline.session_id, baseline.after_training) == (before, False)
+    assert (baseline.session_id, baseline.after_training) == (initial, False)
     assert baseline.other_mdc == 4.2
     assert "Kesar" in (baseline.other_mdc_source or "")
-    FeedbackEngine(given, baseline)
-    _, first = _for_take(clinic, before)
+    FeedbackEngine(inputs, baseline)
+    _, first = _for_take(clinic, initial)
     assert first.mean is None, "nothing was known before the first walk"
     assert first.other_mdc == 4.2, "the limit holds all the same"
 
@@ -198,18 +198,18 @@ async def test_a_visit_after_a_training_begins_with_retention_and_goes_on_at_its
     patient = feedback.person(clinic)
     async with clinic.client("clinician") as client:
         path = f"{API}/patients/{patient}/prescriptions"
-        made = (
+        body = (
             await client.post(path, json=prescription().to_json() | {"parameter": "step_length_m"})
         ).json()
         cues, _ = train([0.6] * 30)
         trained = feedback.visit(clinic, patient, 0)
-        feedback.take(clinic, trained, made["id"], cues)
+        feedback.take(clinic, trained, body["id"], cues)
         later = feedback.visit(clinic, patient, 7)
         _, baseline = _for_take(clinic, later)
         assert (baseline.after_training, baseline.last_level) == (True, 2)
         assert not _for_take(clinic, trained)[1].after_training, "the second take of the same visit"
-        again = prescription(schedule={"kind": "fading"}).to_json()
-        await client.post(path, json=again)
+        repeat = prescription(schedule={"kind": "fading"}).to_json()
+        await client.post(path, json=repeat)
         _, baseline = _for_take(clinic, later)
         assert (baseline.after_training, baseline.last_level) == (True, None), "a new record of the same"
         await client.post(path, json=MANUAL)

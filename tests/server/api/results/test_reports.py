@@ -24,21 +24,21 @@ async def test_json_and_tables_tell_the_same_numbers(clinic: Clinic) -> None:
         patient = patients.create(c, None, code="RE-1").id
         session, empty = (sessions.create(c, None, patient).id for _ in range(2))
     done = analysed.finish(clinic, patient, session, analysed.files())
-    here = f"{API}/sessions/{session}"
+    address = f"{API}/sessions/{session}"
     async with clinic.client("viewer") as client:
-        report = (await client.get(f"{here}/report")).json()
-        parameters = await client.get(f"{here}/parameters.csv")
-        curves = await client.get(f"{here}/curves.csv")
-        behind = (await client.get(f"{here}/parameters/stance_pct")).json()
-        missing = [await client.get(f"{API}/sessions/{empty}/{what}") for what in ("report", "curves.csv")]
-        unknown = await client.get(f"{here}/parameters/no_such_name")
-        odd = await client.get(f"{here}/parameters/Stance")
+        report = (await client.get(f"{address}/report")).json()
+        parameters = await client.get(f"{address}/parameters.csv")
+        curves = await client.get(f"{address}/curves.csv")
+        body = (await client.get(f"{address}/parameters/stance_pct")).json()
+        missing = [await client.get(f"{API}/sessions/{empty}/{label}") for label in ("report", "curves.csv")]
+        unknown = await client.get(f"{address}/parameters/no_such_name")
+        odd = await client.get(f"{address}/parameters/Stance")
     assert report["problem"] is None
     (row,) = [p for p in report["parameters"] if p["name"] == "stance_pct"]
-    assert behind["parameter"]["left"]["value"] == row["left"]["value"]
+    assert body["parameter"]["left"]["value"] == row["left"]["value"]
     used = [s for s in report["strides"] if s["side"] == "left" and s["used"]]
     assert row["left"]["n"] == len(used)
-    assert len(behind["strides"]) == len(report["strides"])
+    assert len(body["strides"]) == len(report["strides"])
     assert f"parameters-{session[:8]}.csv" in parameters.headers["content-disposition"]
     assert f"curves-{session[:8]}.csv" in curves.headers["content-disposition"]
     table = [r for r in rows_of(parameters.text) if "stance_pct" in r.values()]
@@ -47,7 +47,7 @@ async def test_json_and_tables_tell_the_same_numbers(clinic: Clinic) -> None:
     assert len(curve) == 101
     assert [a.status_code for a in (*missing, unknown, odd)] == [404, 404, 404, 422]
     async with clinic.client("assistant") as client:
-        assert (await client.get(f"{here}/report")).status_code == 403
+        assert (await client.get(f"{address}/report")).status_code == 403
     async with clinic.client("admin") as client:
         rows = [r for r in (await client.get(f"{API}/audit")).json() if r["resource_id"] == session]
     assert {"report.opened", "parameter.opened"} <= {r["action"] for r in rows}

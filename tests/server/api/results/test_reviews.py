@@ -1,4 +1,4 @@
-"""Review of an analysis: what an edit changes, what is refused, undo, and that everything follows it."""
+"""Review of an analysis: effects of edits, refusals, undo, dependent results."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def _session(clinic: Clinic, results: Any) -> str:
 
 
 def parameter(answer: dict[str, Any], name: str, side: str) -> dict[str, Any]:
-    found: dict[str, Any] = next(p for p in answer["parameters"] if (p["name"], p["side"]) == (name, side))
-    return found
+    fields: dict[str, Any] = next(p for p in answer["parameters"] if (p["name"], p["side"]) == (name, side))
+    return fields
 
 
 def move(by_s: float = 0.04) -> dict[str, Any]:
@@ -60,24 +60,27 @@ async def test_without_edits_the_review_is_the_stored_analysis(clinic: Clinic, p
 
 async def test_a_moved_contact_changes_its_strides_and_says_who_did_it(clinic: Clinic, path: str) -> None:
     async with clinic.client("clinician") as client:
-        before = (await client.get(f"{path}/edits")).json()
-        made = await client.post(f"{path}/edits", json=move())
-        after = made.json()
-    assert made.status_code == 201
-    assert after["version"] > 0
-    (edit,) = after["edits"]
+        initial_body = (await client.get(f"{path}/edits")).json()
+        response = await client.post(f"{path}/edits", json=move())
+        final_body = response.json()
+    assert response.status_code == 201
+    assert final_body["version"] > 0
+    (edit,) = final_body["edits"]
     assert (edit["kind"], edit["by"], edit["to_s"]) == ("move_event", "clinician", CONTACT + 0.04)
-    moved = [e for e in after["events"] if e["source"] == "manual"]
+    moved = [e for e in final_body["events"] if e["source"] == "manual"]
     assert [(e["side"], e["kind"]) for e in moved] == [("left", "ic")]
     assert moved[0]["time_s"] == pytest.approx(CONTACT + 0.04, abs=1e-6)
-    assert parameter(after, "stride_time_s", "left")["sd"] > parameter(before, "stride_time_s", "left")["sd"]
-    right = [parameter(x, "stride_time_s", "right")["mean"] for x in (before, after)]
+    assert (
+        parameter(final_body, "stride_time_s", "left")["sd"]
+        > parameter(initial_body, "stride_time_s", "left")["sd"]
+    )
+    right = [parameter(x, "stride_time_s", "right")["mean"] for x in (initial_body, final_body)]
     assert right[0] == pytest.approx(right[1], abs=1e-6)
 
 
 async def test_undo_gives_back_exactly_what_was_there(clinic: Clinic, path: str) -> None:
     async with clinic.client("clinician") as client:
-        before = (await client.get(f"{path}/edits")).json()
+        initial_body = (await client.get(f"{path}/edits")).json()
         first = (await client.post(f"{path}/edits", json=move())).json()
         await client.post(f"{path}/edits", json=LEAVE_OUT)
         one = (await client.delete(f"{path}/edits")).json()
@@ -85,7 +88,7 @@ async def test_undo_gives_back_exactly_what_was_there(clinic: Clinic, path: str)
         refused = await client.delete(f"{path}/edits")
     for name in ("events", "strides", "parameters"):
         assert one[name] == first[name]
-        assert none[name] == before[name]
+        assert none[name] == initial_body[name]
     assert (none["edits"], refused.status_code, refused.json()["code"]) == ([], 409, "nothing_to_undo")
 
 
@@ -97,13 +100,13 @@ async def test_redo_makes_again_what_was_undone_until_there_is_a_new_edit(clinic
 
         assert (await redo()).json()["code"] == "nothing_to_redo"
         one = (await client.post(f"{path}/edits", json=move())).json()
-        both = (await client.post(f"{path}/edits", json=LEAVE_OUT)).json()
+        joint_body = (await client.post(f"{path}/edits", json=LEAVE_OUT)).json()
         for left in (1, 2):
             assert (await client.delete(f"{path}/edits")).json()["redoable"] == left
-        again = [(await redo()).json() for _ in range(2)]
-        assert [r["redoable"] for r in again] == [1, 0]
+        second_bodies = [(await redo()).json() for _ in range(2)]
+        assert [r["redoable"] for r in second_bodies] == [1, 0]
         for name in ("events", "strides", "parameters"):
-            assert [r[name] for r in again] == [one[name], both[name]]
+            assert [r[name] for r in second_bodies] == [one[name], joint_body[name]]
         assert (await redo()).status_code == 409
         await client.delete(f"{path}/edits")
         new = await client.post(f"{path}/edits", json={**LEAVE_OUT, "reason": "turned"})
@@ -116,9 +119,9 @@ async def test_an_undone_state_and_another_edit_are_not_confused(clinic: Clinic,
     async with clinic.client("clinician") as client:
         one = (await client.post(f"{path}/edits", json=move(0.04))).json()
         await client.delete(f"{path}/edits")
-        other = (await client.post(f"{path}/edits", json=move(0.02))).json()
-    assert one["parameters"] != other["parameters"]
-    assert len(other["edits"]) == 1
+        other_body = (await client.post(f"{path}/edits", json=move(0.02))).json()
+    assert one["parameters"] != other_body["parameters"]
+    assert len(other_body["edits"]) == 1
 
 
 @pytest.mark.slow
@@ -138,22 +141,22 @@ async def test_report_tables_and_pages_follow_the_edits(clinic: Clinic, path: st
             assert words is not None
             return {"report": report, "words": words[1], **tables}
 
-        before = await seen()
+        initial = await seen()
         await client.post(f"{path}/edits", json=LEAVE_OUT)
-        after = await seen()
+        final = await seen()
         await client.delete(f"{path}/edits")
-        assert await seen() == before
-    assert int(after["words"]) == int(before["words"]) - 1
-    assert sum(s["used"] for s in after["report"]["strides"]) == int(after["words"])
-    (said,) = [w["message"] for w in after["report"]["warnings"] if w["code"] == "edited"]
-    assert "1 stride left out" in said
-    assert any(r["excluded_reason"] == "manual:stumbled" for r in after["strides"])
+        assert await seen() == initial
+    assert int(final["words"]) == int(initial["words"]) - 1
+    assert sum(s["used"] for s in final["report"]["strides"]) == int(final["words"])
+    (message,) = [w["message"] for w in final["report"]["warnings"] if w["code"] == "edited"]
+    assert "1 stride left out" in message
+    assert any(r["excluded_reason"] == "manual:stumbled" for r in final["strides"])
     counts = [
         next(int(r["n"]) for r in table if r["name"] == "stride_time_s" and r["side"] == "left")
-        for table in (before["parameters"], after["parameters"])
+        for table in (initial["parameters"], final["parameters"])
     ]
     assert counts[1] == counts[0] - 1
-    assert before["curves"] != after["curves"]
+    assert initial["curves"] != final["curves"]
 
 
 async def test_the_stored_files_stay_as_the_worker_wrote_them(clinic: Clinic, path: str) -> None:
@@ -281,8 +284,8 @@ async def test_signals_are_listed_and_thinned_without_losing_a_peak(clinic: Clin
         async def window(name: str, **query: Any) -> dict[str, Any]:
             answer = await client.get(f"{path}/signals/{name}", params=query)
             assert answer.status_code == 200, answer.text
-            found: dict[str, Any] = answer.json()
-            return found
+            fields: dict[str, Any] = answer.json()
+            return fields
 
         whole = await window("foot_pitch", points=4000)
         assert whole["step_s"] == pytest.approx(0.01)

@@ -36,30 +36,30 @@ def made() -> SquatSimulation:
     return simulate_squats(squats, HEIGHT_M, 0, setup, place_as_agreed(HEIGHT_M, squats.sides))
 
 
-async def visit(clinic: Clinic, made: SquatSimulation, code: str, protocol: str = "squat") -> str:
+async def visit(clinic: Clinic, result: SquatSimulation, code: str, protocol: str = "squat") -> str:
     async with clinic.client("clinician") as client:
         patient = (await client.post(f"{API}/patients", json={"code": code})).json()["id"]
-        asked = {"title": "Squats", "protocol": protocol}
-        session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=asked)).json()["id"]
-    analysed.finish(clinic, patient, session, analysis_files(analyse(made.recording)))
+        requests = {"title": "Squats", "protocol": protocol}
+        session: str = (await client.post(f"{API}/patients/{patient}/sessions", json=requests)).json()["id"]
+    analysed.finish(clinic, patient, session, analysis_files(analyse(result.recording)))
     return session
 
 
-def work(clinic: Clinic, session: str, made: SquatSimulation, *others: SourceFile) -> list[str]:
-    """What a worker and its child do with the next job, in this process; the stages that were told."""
-    state, told = clinic.app.state, list[str]()
+def work(clinic: Clinic, session: str, result: SquatSimulation, *rest_of: SourceFile) -> list[str]:
+    """Run the next job like a worker and its child, in this process; return the reported stages."""
+    state, notices = clinic.app.state, list[str]()
     claim = state.queue.claim("tester", [SENSITIVITY])
 
     def say(stage: str, share: float, message: str | None = None) -> None:
-        told.append(stage)
+        notices.append(stage)
 
-    files = [SourceFile.of_bytes("recording.parquet", write_recording(made.recording)), *others]
+    files = [SourceFile.of_bytes("recording.parquet", write_recording(result.recording)), *rest_of]
     results = sensitivities.run(files, claim.params, Attempt(say, lambda content: None))
     with clinic.db.read() as c:
         patient = sessions.get(c, session).patient_id
     stored = {name: state.blobs.put(patient, content) for name, content in results.items()}
     assert state.queue.finish(claim, lambda c: sensitivities.publish(c, claim, results, stored))
-    return told
+    return notices
 
 
 @pytest.mark.slow
@@ -76,21 +76,21 @@ async def test_both_legs_against_themselves_and_against_a_reference(
         assert (job["kind"], job["state"]) == ("sensitivity", "queued")
         assert (await client.post(path, json={})).json()["id"] == job["id"], "the same is run once"
         assert (await client.get(path)).json() == []
-        told = work(clinic, session, made)
-        assert list(dict.fromkeys(told)) == ["analysis", "parameters"]
+        notices = work(clinic, session, made)
+        assert list(dict.fromkeys(notices)) == ["analysis", "parameters"]
         [about] = (await client.get(path)).json()
         assert (about["id"], about["reference"], about["from_standing"]) == (job["id"], None, True)
-        found = (await client.get(f"{API}/sensitivities/{about['id']}")).json()
-        assert found["about"] == about
-        legs = found["result"]["legs"]
+        body = (await client.get(f"{API}/sensitivities/{about['id']}")).json()
+        assert body["about"] == about
+        legs = body["result"]["legs"]
         assert [leg["side"] for leg in legs] == ["left", "right"]
         assert all(len(leg["rows"]) == 24 and leg["error_deg"] == [0.0] * 7 for leg in legs)
         table = await client.get(f"{API}/analyses/{about['analysis_id']}/files/{about['files'][1]}")
         assert len(list(csv.DictReader(io.StringIO(table.text)))) == 2 * 24 * 7
 
         await client.put(f"{API}/sessions/{session}/references/optical.parquet", content=truth)
-        asked = {"reference": "optical.parquet", "from_standing": False}
-        assert (await client.post(path, json=asked)).json()["id"] != job["id"]
+        requests = {"reference": "optical.parquet", "from_standing": False}
+        assert (await client.post(path, json=requests)).json()["id"] != job["id"]
         work(clinic, session, made, SourceFile.of_bytes("optical.parquet", truth))
         newest = (await client.get(path)).json()[0]
         result = (await client.get(f"{API}/sensitivities/{newest['id']}")).json()["result"]
@@ -126,11 +126,11 @@ async def test_it_is_cancelled_like_other_jobs(clinic: Clinic, made: SquatSimula
 @pytest.mark.slow
 async def test_what_cannot_be_analysed_is_refused(clinic: Clinic, made: SquatSimulation) -> None:
     session = await visit(clinic, made, "walks", protocol="walk")
-    other = await visit(clinic, made, "squats")
+    second = await visit(clinic, made, "squats")
     async with clinic.client("clinician") as client:
         refused = await client.post(f"{API}/sessions/{session}/sensitivities", json={})
         assert (refused.status_code, refused.json()["code"]) == (409, "not_squats")
-        path = f"{API}/sessions/{other}/sensitivities"
+        path = f"{API}/sessions/{second}/sensitivities"
         assert (await client.post(path, json={"reference": "none.parquet"})).status_code == 404
         assert (await client.post(path, json={"legs": 2})).status_code == 422
         assert (

@@ -1,4 +1,4 @@
-"""Answers about visits compared: what the core and the report know of them is in them."""
+"""Schemas of trends contain all fields of core and report."""
 
 from __future__ import annotations
 
@@ -36,7 +36,12 @@ def test_a_condition_is_answered_as_it_was_walked_and_in_words() -> None:
     walked = replace(
         USUAL, pace="fast", aid="stick", feedback=True, protocol="treadmill", belt_speed_mps=1.25
     )
-    said = make_answer(schemas.Condition, walked)
-    assert (said.protocol, said.belt_speed_mps, said.pace, said.aid) == ("treadmill", 1.25, "fast", "stick")
-    assert said.words == walked.words
-    assert "1.25" in said.words
+    message = make_answer(schemas.Condition, walked)
+    assert (message.protocol, message.belt_speed_mps, message.pace, message.aid) == (
+        "treadmill",
+        1.25,
+        "fast",
+        "stick",
+    )
+    assert message.words == walked.words
+    assert "1.25" in message.words

@@ -37,8 +37,8 @@ async def patient(clinic: Clinic) -> str:
 
 
 def _trend(answer: dict[str, Any], name: str) -> dict[str, Any]:
-    found: dict[str, Any] = next(t for t in answer["trends"] if t["name"] == name)
-    return found
+    fields: dict[str, Any] = next(t for t in answer["trends"] if t["name"] == name)
+    return fields
 
 
 async def test_visits_come_oldest_first_with_their_change_against_the_first(
@@ -77,14 +77,14 @@ async def test_an_edit_moves_the_point_of_its_visit(clinic: Clinic, patient: str
     contact = walk.events().times("left", "ic")[3]
     edit = {"kind": "exclude_stride", "side": "left", "time_s": contact + 0.5, "reason": "stumbled"}
     async with clinic.client("clinician") as client:
-        before = _trend((await client.get(path)).json(), "stride_time_s")["lines"][0]["points"]
+        initial = _trend((await client.get(path)).json(), "stride_time_s")["lines"][0]["points"]
         assert (await client.post(f"{API}/sessions/{session}/edits", json=edit)).status_code == 201
-        after = _trend((await client.get(path)).json(), "stride_time_s")["lines"][0]["points"]
+        final = _trend((await client.get(path)).json(), "stride_time_s")["lines"][0]["points"]
         assert (await client.delete(f"{API}/sessions/{session}/edits")).status_code == 200
         undone = _trend((await client.get(path)).json(), "stride_time_s")["lines"][0]["points"]
-    assert after[0]["n"] == before[0]["n"] - 1
-    assert after[1] == before[1] | {"change": after[1]["change"]}
-    assert undone == before
+    assert final[0]["n"] == initial[0]["n"] - 1
+    assert final[1] == initial[1] | {"change": final[1]["change"]}
+    assert undone == initial
 
 
 async def test_visits_of_another_protocol_are_asked_for(clinic: Clinic, patient: str) -> None:
@@ -101,10 +101,12 @@ async def test_limits_are_those_of_the_affected_limb(clinic: Clinic, patient: st
     async with clinic.client("clinician") as client:
         unknown = (await client.get(f"{path}/trends?show=hip_flexion_rom_deg")).json()["trends"][0]["lines"]
         assert (await client.patch(path, json={"affected_side": "left"})).status_code == 200
-        known = (await client.get(f"{path}/trends?show=hip_flexion_rom_deg")).json()["trends"][0]["lines"]
+        known_body = (await client.get(f"{path}/trends?show=hip_flexion_rom_deg")).json()["trends"][0][
+            "lines"
+        ]
     # Guzik 2021: MCID 5.81° of the affected, 2.86° of the unaffected hip; the larger where nobody knows
     assert [line["mcid"] for line in unknown] == [5.81, 5.81]
-    assert [line["mcid"] for line in known] == [5.81, 2.86]
+    assert [line["mcid"] for line in known_body] == [5.81, 2.86]
 
 
 async def test_the_table_has_a_row_for_every_figure_side_and_visit(clinic: Clinic, patient: str) -> None:
@@ -138,16 +140,16 @@ async def test_a_planned_training_is_a_small_dot(clinic: Clinic, patient: str) -
     session = _add(clinic, patient, 0)
     async with clinic.client("clinician") as client:
         body = {"starts_on": "2026-03-02"}
-        made = (await client.post(f"{API}/patients/{patient}/programmes", json=body)).json()
-        first = next(v for v in made["visits"] if v["label"] == "T1")
+        payload = (await client.post(f"{API}/patients/{patient}/programmes", json=body)).json()
+        first = next(v for v in payload["visits"] if v["label"] == "T1")
         linked = await client.patch(f"{API}/planned-visits/{first['id']}", json={"session_id": session})
         assert linked.status_code == 200
         answer = (await client.get(f"{API}/patients/{patient}/trends")).json()
         assert [(v["label"], v["kind"]) for v in answer["visits"]] == [("T1", "training")]
-        again = await client.post(f"{API}/patients/{patient}/programmes", json=body)
-        assert (again.status_code, again.json()["code"]) == (409, "programme_running")
-        new = {"title": "Second training", "planned_visit_id": made["visits"][2]["id"]}
+        second_response = await client.post(f"{API}/patients/{patient}/programmes", json=body)
+        assert (second_response.status_code, second_response.json()["code"]) == (409, "programme_running")
+        new = {"title": "Second training", "planned_visit_id": payload["visits"][2]["id"]}
         assert (await client.post(f"{API}/patients/{patient}/sessions", json=new)).status_code == 201
-        known = (await client.get(f"{API}/patients/{patient}/programmes")).json()
-        assert [v["label"] for v in known[0]["visits"] if v["state"] == "done"] == ["T1", "T2"]
-        assert (await client.delete(f"{API}/programmes/{made['id']}")).status_code == 204
+        known_body = (await client.get(f"{API}/patients/{patient}/programmes")).json()
+        assert [v["label"] for v in known_body[0]["visits"] if v["state"] == "done"] == ["T1", "T2"]
+        assert (await client.delete(f"{API}/programmes/{payload['id']}")).status_code == 204

@@ -35,22 +35,24 @@ async def session_with_trials(clinic: Clinic, code: str) -> str:
 
 
 def work(clinic: Clinic, job_id: str) -> list[tuple[str, float, str | None]]:
-    """What a worker and its child do, in this process; what was said of the progress."""
-    queue, said = clinic.app.state.queue, []
+    """Run the next job like a worker and its child, in this process; return the progress messages."""
+    queue, text = clinic.app.state.queue, []
     claim = queue.claim("tester", [TUNE])
     assert claim.job_id == job_id
-    kept: list[bytes] = []
+    stored_chunks: list[bytes] = []
 
     def say(stage: str, share: float, message: str | None = None) -> None:
-        said.append((stage, share, message))
+        text.append((stage, share, message))
 
     files = [SourceFile.of_bytes(name, content) for name, content in TRIALS.items()]
-    content = tunings.run(files, claim.params, Attempt(say, kept.append))
-    assert len(kept) == 6
-    assert tunings.run(files, claim.params, Attempt(say, kept.append, kept[2])) == content
-    assert tunings.run(files, claim.params, Attempt(say, kept.append, b"of another version")) == content
+    content = tunings.run(files, claim.params, Attempt(say, stored_chunks.append))
+    assert len(stored_chunks) == 6
+    assert tunings.run(files, claim.params, Attempt(say, stored_chunks.append, stored_chunks[2])) == content
+    assert (
+        tunings.run(files, claim.params, Attempt(say, stored_chunks.append, b"of another version")) == content
+    )
     assert queue.finish(claim, lambda c: tunings.publish(c, claim, content, {}))
-    return said
+    return text
 
 
 @pytest.mark.slow
@@ -62,19 +64,19 @@ async def test_a_tuning_is_asked_for_and_its_result_is_downloaded(clinic: Clinic
         assert (job["kind"], job["state"]) == ("tune", "queued")
         assert (await client.post(path, json=ORDER)).json()["id"] == job["id"]
         assert (await client.get(f"{API}/sessions/{session}")).json()["state"] == "uploaded"
-        said = work(clinic, job["id"])
-        assert said[0][0] == "reading"
-        assert said[6][:2] == ("searching", 1.0)
-        assert str(said[6][2]).startswith("Round 2 of 2, ")
-        [found] = (await client.get(path)).json()
-        assert found["job_id"] == job["id"]
-        assert set(found["result"]["data"]) == {"a", "judge"}
-        assert len(found["result"]["data_sha256"]) == 64
-        assert (await client.get(f"{API}/tunings/{found['id']}")).json() == found
+        text = work(clinic, job["id"])
+        assert text[0][0] == "reading"
+        assert text[6][:2] == ("searching", 1.0)
+        assert str(text[6][2]).startswith("Round 2 of 2, ")
+        [body] = (await client.get(path)).json()
+        assert body["job_id"] == job["id"]
+        assert set(body["result"]["data"]) == {"a", "judge"}
+        assert len(body["result"]["data_sha256"]) == 64
+        assert (await client.get(f"{API}/tunings/{body['id']}")).json() == body
         # what was tuned on stays as it was
-        before = found["recording_id"]
+        initial = body["recording_id"]
         await client.put(f"{API}/sessions/{session}/files/more.npz", content=b"x")
-        assert (await client.get(f"{API}/sessions/{session}/recording")).json()["id"] != before
+        assert (await client.get(f"{API}/sessions/{session}/recording")).json()["id"] != initial
     async with clinic.client("assistant") as client:
         assert (await client.post(path, json=ORDER)).status_code == 403
         assert (await client.get(path)).status_code == 403

@@ -39,15 +39,15 @@ async def switch(clinic: Clinic, *, on: bool, **more: bool) -> None:
 async def add(clinic: Clinic, code: str) -> str:
     """Id of a new patient, added by an administrator, who is in no team."""
     async with clinic.client("admin") as client:
-        made = await client.post(f"{API}/patients", json={"code": code})
-        assert made.status_code == 201, made.text
-        return str(made.json()["id"])
+        response = await client.post(f"{API}/patients", json={"code": code})
+        assert response.status_code == 201, response.text
+        return str(response.json()["id"])
 
 
 async def team(clinic: Clinic, patient: str) -> set[str]:
     async with clinic.client("admin") as client:
-        found = (await client.get(f"{API}/patients/{patient}/care-team")).json()
-    return {member["name"] for member in found["members"]}
+        body = (await client.get(f"{API}/patients/{patient}/care-team")).json()
+    return {member["name"] for member in body["members"]}
 
 
 async def enter(clinic: Clinic, role: str, patient: str) -> int:
@@ -70,9 +70,9 @@ async def test_care_teams_begin_with_whoever_has_worked_with_the_patient(clinic:
         visit = (await client.post(f"{API}/patients/{patient}/sessions", json={"title": "Walk"})).json()["id"]
     async with clinic.client("assistant") as client:
         assert (await client.get(f"{API}/sessions/{visit}")).status_code == 200
-    who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+    identity = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
     with clinic.db.write() as c:  # the row that the tables of a study leave of each visit
-        audit.record(c, who, "study.exported", "session", visit, {"visits": 1})
+        audit.record(c, identity, "study.exported", "session", visit, {"visits": 1})
     await switch(clinic, on=True, begin_with_past=True)
     assert await team(clinic, patient) == {"assistant"}
     async with clinic.client("admin") as client:
@@ -91,8 +91,8 @@ async def test_trying_a_patient_of_another_team_is_a_row_and_no_way_into_it(clin
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()
         assert "tried to open the patient, from outside the care team" in (await client.get("/audit")).text
-    here = [r for r in rows if r["resource_id"] in {hidden, "0" * 32}]
-    tried = [(r["user_name"], r["resource_id"]) for r in here if r["action"] == "patient.hidden"]
+    place = [r for r in rows if r["resource_id"] in {hidden, "0" * 32}]
+    tried = [(r["user_name"], r["resource_id"]) for r in place if r["action"] == "patient.hidden"]
     assert tried == [("viewer", hidden)]
     await switch(clinic, on=False)
     await switch(clinic, on=True, begin_with_past=True)
@@ -132,9 +132,9 @@ async def open_in_emergency(clinic: Clinic, name: str, code: str) -> str:
     """Id of the access of a clinician."""
     assert await ask_in_emergency(clinic, code, name) == 201
     with clinic.db.read() as c:
-        found = select(emergency_access.c.id).join(user).join(patient_table)
-        found = found.where(user.c.name == name, patient_table.c.code == code)
-        return str(c.execute(found.order_by(emergency_access.c.opened_at.desc())).scalars().first())
+        indices = select(emergency_access.c.id).join(user).join(patient_table)
+        indices = indices.where(user.c.name == name, patient_table.c.code == code)
+        return str(c.execute(indices.order_by(emergency_access.c.opened_at.desc())).scalars().first())
 
 
 async def sign(clinic: Clinic, patient: str) -> str:
@@ -151,22 +151,22 @@ async def sign(clinic: Clinic, patient: str) -> str:
 
 async def share(clinic: Clinic, name: str, report: str) -> dict[str, Any]:
     async with clinic.client(name) as client:
-        made = await client.post(f"{API}/signed-reports/{report}/links", json={"days": 90})
-        assert made.status_code == 201, made.text
-        return dict(made.json())
+        response = await client.post(f"{API}/signed-reports/{report}/links", json={"days": 90})
+        assert response.status_code == 201, response.text
+        return dict(response.json())
 
 
-def leads(clinic: Clinic, made: dict[str, Any]) -> bool:
+def leads(clinic: Clinic, result: dict[str, Any]) -> bool:
     with clinic.db.read() as c:
         try:
-            return report_links.find_by_token(c, made["url"].rsplit("/", 1)[1]).is_open
+            return report_links.find_by_token(c, result["url"].rsplit("/", 1)[1]).is_open
         except report_links.LinkNotFound:
             return False
 
 
-def is_revoked(clinic: Clinic, made: dict[str, Any]) -> bool:
+def is_revoked(clinic: Clinic, result: dict[str, Any]) -> bool:
     with clinic.db.read() as c:
-        return report_links.get(c, made["link"]["id"]).revoked_at is not None
+        return report_links.get(c, result["link"]["id"]).revoked_at is not None
 
 
 @pytest.mark.slow
@@ -195,13 +195,13 @@ async def test_an_emergency_ends_now_with_its_links(clinic: Clinic, by: str) -> 
         async with clinic.client(name) as client:
             assert (await client.post(ends)).status_code == status, name
     assert await enter(clinic, "locum", patient) == 200
-    for name, shown in (("locum", True), ("admin", True), ("member", False)):
+    for name, view in (("locum", True), ("admin", True), ("member", False)):
         async with clinic.client(name) as client:
             page = (await client.get(f"/patients/{patient}")).text
             assert "opened this patient in an emergency" in page
             # of whoever is in another zone: four hours on the clock of the wall would not be four
             assert " ".join(page.split()).count(" UTC") >= 3, "since, until, and until above"
-            assert ("End now" in page) == shown, name
+            assert ("End now" in page) == view, name
     async with clinic.client(by) as client:
         ended = await client.post(ends)
         assert ended.status_code == 200, ended.text
@@ -279,15 +279,15 @@ async def test_links_of_makers_who_had_left_before_an_upgrade_end_at_the_start(t
     async with open_clinic(tmp_path) as clinic:
         patient = await add(clinic, "Yew")
         clinic.user("clinician", "leaver")
-        made = await share(clinic, "leaver", await sign(clinic, patient))
+        result = await share(clinic, "leaver", await sign(clinic, patient))
         with clinic.db.write() as c:
             c.execute(update(user).where(user.c.name == "leaver").values(active=False))
-        assert not is_revoked(clinic, made)
+        assert not is_revoked(clinic, result)
         source = clinic.settings.database_source
     command.downgrade(configuration(source), "0021")  # which did not know the makers
     async with open_clinic(tmp_path) as clinic:
-        assert is_revoked(clinic, made)
-        assert not leads(clinic, made)
+        assert is_revoked(clinic, result)
+        assert not leads(clinic, result)
 
 
 @pytest.mark.parametrize("how", ["ended", "by_the_clock", "role"])
@@ -300,15 +300,15 @@ async def test_a_link_of_a_member_ends_with_the_last_access_to_the_report(clinic
     await switch(clinic, on=True)
     access = await open_in_emergency(clinic, name, code)
     await set_team(clinic, patient, name)
-    made = await share(clinic, name, report)
-    assert made["link"]["emergency_id"] is None
+    result = await share(clinic, name, report)
+    assert result["link"]["emergency_id"] is None
     if how != "role":
         await set_team(clinic, patient)
-    assert leads(clinic, made), "the emergency goes on"
+    assert leads(clinic, result), "the emergency goes on"
     if how == "ended":
         async with clinic.client(name) as client:
             (await client.post(f"{API}/emergency-accesses/{access}/end")).raise_for_status()
-        assert is_revoked(clinic, made)
+        assert is_revoked(clinic, result)
     elif how == "by_the_clock":
         with clinic.db.write() as c:
             mine = emergency_access.c.id == access
@@ -317,8 +317,8 @@ async def test_a_link_of_a_member_ends_with_the_last_access_to_the_report(clinic
         async with clinic.client("admin") as client:
             to = f"{API}/users/{clinic.user(name)}"
             (await client.patch(to, json={"role": "assistant"})).raise_for_status()
-        assert is_revoked(clinic, made)
-    assert not leads(clinic, made)
+        assert is_revoked(clinic, result)
+    assert not leads(clinic, result)
     await switch(clinic, on=False)
 
 
@@ -395,12 +395,12 @@ async def test_guessed_codes_at_one_address_do_not_close_the_sign_in(clinic: Cli
 async def test_a_refused_code_of_another_team_tells_no_spelling_and_is_counted(
     clinic: Clinic, way: str
 ) -> None:
-    hidden, known = await add(clinic, f"Rowan-{way}"), await add(clinic, f"Spruce-{way}")
+    hidden, reference = await add(clinic, f"Rowan-{way}"), await add(clinic, f"Spruce-{way}")
     async with clinic.client("admin") as client:
         users = {"users": [clinic.user("clinician")]}
-        assert (await client.put(f"{API}/patients/{known}/care-team", json=users)).status_code == 200
+        assert (await client.put(f"{API}/patients/{reference}/care-team", json=users)).status_code == 200
     await switch(clinic, on=True)
-    method, path = ("POST", "") if way == "add" else ("PATCH", f"/{known}")
+    method, path = ("POST", "") if way == "add" else ("PATCH", f"/{reference}")
 
     async def give(code: str, role: str = "clinician") -> httpx.Response:
         async with clinic.client(role) as client:
@@ -409,14 +409,14 @@ async def test_a_refused_code_of_another_team_tells_no_spelling_and_is_counted(
     if way == "add":  # of one's own team it is no guess
         assert [(await give(f"SPRUCE-{way}")).status_code for _ in range(MAX_PER_PAIR + 1)][-1] == 409
     typed = f"ROWAN-{way}"
-    said = [await give(typed) for _ in range(MAX_PER_PAIR + 1)]
-    assert [answer.status_code for answer in said] == [409] * MAX_PER_PAIR + [429]
-    assert typed in said[0].text
-    assert "Rowan" not in said[0].text
+    message = [await give(typed) for _ in range(MAX_PER_PAIR + 1)]
+    assert [answer.status_code for answer in message] == [409] * MAX_PER_PAIR + [429]
+    assert typed in message[0].text
+    assert "Rowan" not in message[0].text
     assert (await give(typed, "admin")).status_code == 409
     assert await ask_in_emergency(clinic, f"Rowan-{way}") == 201  # this door stays open
     async with clinic.client("clinician") as client:
-        noted = await client.patch(f"{API}/patients/{known}", json={"note": "uses a stick"})
+        noted = await client.patch(f"{API}/patients/{reference}", json={"note": "uses a stick"})
         assert noted.status_code == 200
     async with clinic.client("admin") as client:
         rows = (await client.get(f"{API}/audit")).json()

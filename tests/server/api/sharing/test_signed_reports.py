@@ -35,12 +35,12 @@ async def test_a_report_is_written_locked_shared_and_reopened(clinic: Clinic) ->
             signed_reports.keep_signed(c, None, signature, session, new_id(), "en", stored)
         assert [(r["id"], r["number"]) for r in (await client.get(signed)).json()] == [(report, 1)]
         assert (await client.put(text, json={"content": None})).json()["code"] == "report_signed"
-        made = await client.post(f"{API}/signed-reports/{report}/links", json={})
-        assert made.status_code == 201, made.text
-        url = made.json()["url"]
+        response = await client.post(f"{API}/signed-reports/{report}/links", json={})
+        assert response.status_code == 201, response.text
+        url = response.json()["url"]
         assert url.startswith("http://127.0.0.1/r/")
-        assert made.json()["qr"].startswith("data:image/svg+xml")
-        link = made.json()["link"]
+        assert response.json()["qr"].startswith("data:image/svg+xml")
+        link = response.json()["link"]
         begins, ends = (dt.datetime.fromisoformat(link[k]) for k in ("made_at", "expires_at"))
         assert ends - begins == dt.timedelta(days=USUAL_DAYS)
         listed = await client.get(f"{API}/sessions/{session}/report-links")

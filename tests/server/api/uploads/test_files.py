@@ -78,7 +78,7 @@ async def test_a_file_comes_back_byte_for_byte_under_its_own_name(clinic: Clinic
 )
 async def test_names_that_lead_elsewhere_are_refused(clinic: Clinic, name: str) -> None:
     session = await new_session(clinic, f"bad {abs(hash(name))}")
-    before = blobs(clinic)
+    initial = blobs(clinic)
     async with clinic.client("clinician") as client:
         encoded = quote(name, safe="").replace(".", "%2E")
         answer = await client.put(f"{API}/sessions/{session}/files/{encoded}", content=b"x")
@@ -86,7 +86,7 @@ async def test_names_that_lead_elsewhere_are_refused(clinic: Clinic, name: str) 
         if name.isprintable() and name:  # httpx writes others as %00, and "" as no file
             form = await client.post(f"{API}/sessions/{session}/files", files={"files": (name, b"x")})
             assert (form.status_code, form.json()["code"]) == (422, "bad_file_name")
-    assert blobs(clinic) == before
+    assert blobs(clinic) == initial
     assert await stored_names(clinic, session) == []
 
 
@@ -179,7 +179,7 @@ async def test_nothing_is_read_from_somebody_who_may_not_upload(clinic: Clinic) 
 @pytest.mark.parametrize("kind", ["length", "chunked", "form"])
 async def test_an_upload_that_is_cut_half_way_leaves_nothing(clinic: Clinic, kind: str) -> None:
     session = await new_session(clinic, f"cut {kind}")
-    before = blobs(clinic)
+    initial = blobs(clinic)
     target = f"{API}/sessions/{session}/files"
     head = [f"Host: 127.0.0.1\r\nCookie: sid={clinic.token('clinician')}\r\n"]
     if kind == "form":
@@ -195,10 +195,10 @@ async def test_an_upload_that_is_cut_half_way_leaves_nothing(clinic: Clinic, kin
         writer.write(f"{first} HTTP/1.1\r\n{''.join(head)}\r\n".encode() + start + b"x" * 5_000_000)
         await writer.drain()
         if kind != "form":  # a form is kept apart until it is complete
-            await _until(lambda: len(blobs(clinic)) > len(before))
+            await _until(lambda: len(blobs(clinic)) > len(initial))
         writer.close()
         await writer.wait_closed()
-        await _until(lambda: blobs(clinic) == before)
+        await _until(lambda: blobs(clinic) == initial)
     assert await stored_names(clinic, session) == []
 
 
@@ -211,14 +211,14 @@ async def _until(condition: object) -> None:
 
 
 async def test_a_file_is_reached_only_through_its_own_session(clinic: Clinic) -> None:
-    mine, other = await new_session(clinic, "mine"), await new_session(clinic, "other")
+    mine, second = await new_session(clinic, "mine"), await new_session(clinic, "other")
     async with clinic.client("clinician") as client:
-        for session in (mine, other):
+        for session in (mine, second):
             await client.put(f"{API}/sessions/{session}/files/shared.txt", content=session.encode())
         await client.put(f"{API}/sessions/{mine}/files/only.txt", content=b"mine")
-        assert (await client.get(f"{API}/sessions/{other}/files/shared.txt")).text == other
+        assert (await client.get(f"{API}/sessions/{second}/files/shared.txt")).text == second
         for method in ("GET", "DELETE"):
-            answer = await client.request(method, f"{API}/sessions/{other}/files/only.txt")
+            answer = await client.request(method, f"{API}/sessions/{second}/files/only.txt")
             assert (answer.status_code, answer.json()["code"]) == (404, "not_found")
     assert await stored_names(clinic, mine) == ["only.txt", "shared.txt"]
 
@@ -239,10 +239,10 @@ async def test_the_memory_of_an_upload_does_not_grow_with_its_size(clinic: Clini
         ) as client:
             path = f"{API}/sessions/{session}/files/big.bin"
             await client.put(path, content=body(20))
-            before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            initial_ru_maxrss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
             answer = await client.put(path, content=body(200))
-            after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+            final_ru_maxrss = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     assert answer.status_code == 201
     assert answer.json()["size"] == 200 * 16 * 65536
     # kB; reading the body whole would add 210 000
-    assert after - before < 20_000
+    assert final_ru_maxrss - initial_ru_maxrss < 20_000

@@ -1,4 +1,4 @@
-"""Tables nobody has described: guessed, checked by reading them, said once, and known from then on."""
+"""Undescribed tables: guess, preview, description, and reuse."""
 
 from __future__ import annotations
 
@@ -34,37 +34,37 @@ async def uploaded(clinic: Clinic, code: str, files: dict[str, bytes]) -> str:
 @pytest.mark.slow
 async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(clinic: Clinic) -> None:
     files = {"one_lf.csv": table(), "two_rf.csv": table()}
-    at = await uploaded(clinic, "TABLES-1", {**files, "notes.txt": b"no table"})
+    position = await uploaded(clinic, "TABLES-1", {**files, "notes.txt": b"no table"})
     async with clinic.client("clinician") as client:
-        (shape,) = (await client.get(f"{at}/tables")).json()
+        (shape,) = (await client.get(f"{position}/tables")).json()
         assert shape["files"] == list(files)
         assert shape["basis"] == "guessed"
         assert (shape["source"]["acc_unit"], shape["source"]["gyr_unit"]) == ("g", "deg/s")
         ask: dict[str, Any] = {"file": "one_lf.csv", "source": shape["source"]}
-        refused = await client.post(f"{at}/tables/checks", json=ask)
+        refused = await client.post(f"{position}/tables/checks", json=ask)
         assert (refused.status_code, refused.json()["code"]) == (422, "rate_missing")
         source = shape["source"] | {"rate_hz": 100}
-        (check,) = (await client.post(f"{at}/tables/checks", json=ask | {"source": source})).json()
+        (check,) = (await client.post(f"{position}/tables/checks", json=ask | {"source": source})).json()
         assert check["sensor"] == "foot_l"
         assert check["rate_hz"] == 100.0
         assert check["at_rest_mps2"] == pytest.approx(GRAVITY, abs=0.1)
         assert check["problems"] == []
         wrong = source | {"acc_unit": "m/s2", "gyr_unit": "rad/s"}
-        (check,) = (await client.post(f"{at}/tables/checks", json=ask | {"source": wrong})).json()
+        (check,) = (await client.post(f"{position}/tables/checks", json=ask | {"source": wrong})).json()
         assert len(check["problems"]) == 2
 
-        answer = await client.put(f"{at}/tables", json={"files": list(files), "source": source})
+        answer = await client.put(f"{position}/tables", json={"files": list(files), "source": source})
         manifest = answer.json()["manifest"]
-        given = [SourceFile.of_bytes(name, data) for name, data in files.items()]
-        assert list(read_recording(given, manifest_of(manifest)).streams) == ["foot_l", "foot_r"]
-        (shape,) = (await client.get(f"{at}/tables")).json()
+        inputs = [SourceFile.of_bytes(name, data) for name, data in files.items()]
+        assert list(read_recording(inputs, manifest_of(manifest)).streams) == ["foot_l", "foot_r"]
+        (shape,) = (await client.get(f"{position}/tables")).json()
         assert (shape["basis"], list(shape["source"]["columns"])) == ("said", ["*"])
 
-        again = await uploaded(
+        second = await uploaded(
             clinic, "TABLES-2", {"three.csv": table(), "other.csv": table("n;a;b;c;d;e;f")}
         )
-        assert (await client.post(f"{again}/inspections")).status_code == 202
-        manifest = (await client.get(f"{again}/recording")).json()["manifest"]
+        assert (await client.post(f"{second}/inspections")).status_code == 202
+        manifest = (await client.get(f"{second}/recording")).json()["manifest"]
         assert [(s["file"], s["rate_hz"], list(s["columns"])) for s in manifest["sources"]] == [
             ("three.csv", 100, ["three"])
         ]
@@ -76,14 +76,14 @@ async def test_a_table_is_described_once_and_its_shape_is_known_from_then_on(cli
 
 
 async def test_what_is_no_file_or_no_entry_is_refused(clinic: Clinic) -> None:
-    at = await uploaded(clinic, "TABLES-4", {"one.csv": table()})
+    position = await uploaded(clinic, "TABLES-4", {"one.csv": table()})
     async with clinic.client("clinician") as client:
         for files, source, code in (
             (["two.csv"], {"columns": {}}, "not_found"),
             (["one.csv"], {"columns": {"*": {}}, "speed": 1}, "manifest_unknown_key"),
             (["one.csv"], {"columns": {}}, "manifest_bad_value"),
         ):
-            refused = await client.put(f"{at}/tables", json={"files": files, "source": source})
+            refused = await client.put(f"{position}/tables", json={"files": files, "source": source})
             assert (refused.status_code in (404, 422), refused.json()["code"]) == (True, code)
     async with clinic.client("viewer") as client:
-        assert (await client.get(f"{at}/tables")).status_code == 403
+        assert (await client.get(f"{position}/tables")).status_code == 403

@@ -38,29 +38,29 @@ async def finish(client: httpx.AsyncClient, path: str, content: bytes) -> httpx.
 
 @pytest.mark.slow
 async def test_parts_in_any_order_and_twice_become_the_file_once(clinic: Clinic) -> None:
-    """A sender that loses answers, repeats itself and skips is only told where to go on."""
+    """A sender that loses responses, repeats or skips parts is only told where to resume."""
     session = await new_session(clinic, "parts")
     chance = np.random.default_rng(17)
     content = chance.bytes(50_000)
     async with clinic.client("assistant") as client:
         path = await begin(client, session, len(content))
-        there = 0
-        while there < len(content):
-            offset = int(chance.choice([there, there, max(0, there - 900), there + 1]))
+        target = 0
+        while target < len(content):
+            offset = int(chance.choice([target, target, max(0, target - 900), target + 1]))
             part = content[offset : offset + int(chance.integers(1, 9000))]
             answer = await send(client, path, offset, part)
-            if offset == there:
+            if offset == target:
                 assert answer.status_code == 200
-                there += len(part)
+                target += len(part)
             else:
                 assert (answer.status_code, answer.json()["code"]) == (409, "upload_gap")
-                assert str(there) in answer.json()["detail"]
-            told = await client.head(path)
-            assert told.headers["Upload-Offset"] == str(there)
-            if there < len(content):
+                assert str(target) in answer.json()["detail"]
+            notices = await client.head(path)
+            assert notices.headers["Upload-Offset"] == str(target)
+            if target < len(content):
                 early = await finish(client, path, content)
                 assert (early.status_code, early.json()["code"]) == (409, "upload_incomplete")
-        assert told.headers["Upload-Length"] == str(len(content))
+        assert notices.headers["Upload-Length"] == str(len(content))
         first, second = [await finish(client, path, content) for _ in range(2)]
         assert first.json() == second.json()
         assert first.json()["sha256"] == hashlib.sha256(content).hexdigest()
@@ -108,15 +108,15 @@ async def test_a_cut_connection_leaves_what_came_and_it_is_found_again(clinic: C
         with contextlib.suppress(ConnectionError):
             await writer.wait_closed()
         # as after a reload: announced again, it is the same upload
-        again = await client.post(
+        second_response = await client.post(
             f"{API}/sessions/{session}/uploads", json={"name": "walk.csv", "size": len(content)}
         )
-        assert path.endswith(again.json()["id"])
-        there = again.json()["offset"]
-        assert 2_000_000 <= there < len(content)
+        assert path.endswith(second_response.json()["id"])
+        body = second_response.json()["offset"]
+        assert 2_000_000 <= body < len(content)
         page = await client.get(f"/sessions/{session}/upload")
         assert "Choose the file again to go on" in page.text
-        assert (await send(client, path, there, content[there:])).json()["offset"] == len(content)
+        assert (await send(client, path, body, content[body:])).json()["offset"] == len(content)
         assert (await finish(client, path, content)).status_code == 200
     assert not part.exists()
 
@@ -145,12 +145,12 @@ async def test_limits_hold_for_what_is_announced(tmp_path: Path) -> None:
 
 async def test_what_is_given_up_abandoned_or_erased_goes(tmp_path: Path) -> None:
     async with open_clinic(tmp_path, sweep_grace_s=0) as clinic:
-        session, other = await new_session(clinic, "gone"), await new_session(clinic, "other")
+        session, alternative = await new_session(clinic, "gone"), await new_session(clinic, "other")
         store = clinic.app.state.blobs
         async with clinic.client("clinician") as client:
             path = await begin(client, session, 9, "given up")
             await send(client, path, 0, b"begun")
-            foreign = path.replace(session, other)
+            foreign = path.replace(session, alternative)
             assert (await client.head(foreign)).status_code == 404
             assert (await send(client, foreign, 5, b"more")).status_code == 404
             assert (await client.delete(foreign)).status_code == 404

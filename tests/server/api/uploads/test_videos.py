@@ -1,4 +1,4 @@
-"""A video beside a take: only with consent, only what plays, in ranges, and gone with its session."""
+"""Video of a trial: consent, playable formats, ranges, deletion with its session."""
 
 from __future__ import annotations
 
@@ -38,10 +38,14 @@ async def test_nobody_is_filmed_without_having_agreed(clinic: Clinic) -> None:
         assert (refused.status_code, refused.json()["code"]) == (422, "no_consent")
         assert blobs(clinic, patient) == []
         assert (await client.get(path)).status_code == 404
-        made = await client.put(f"{path}?name=a.webm&consent=true", content=FILM)
-        assert made.status_code == 201, made.text
-        kept = (await client.get(path)).json()
-    assert (kept["name"], kept["consent_by"], kept["offset_s"]) == ("a.webm", "clinician", None)
+        response = await client.put(f"{path}?name=a.webm&consent=true", content=FILM)
+        assert response.status_code == 201, response.text
+        stored_body = (await client.get(path)).json()
+    assert (stored_body["name"], stored_body["consent_by"], stored_body["offset_s"]) == (
+        "a.webm",
+        "clinician",
+        None,
+    )
 
 
 async def test_a_video_has_the_limit_of_a_file_and_its_alignment_that_of_a_request(clinic: Clinic) -> None:
@@ -49,8 +53,8 @@ async def test_a_video_has_the_limit_of_a_file_and_its_alignment_that_of_a_reque
     path = f"{API}/sessions/{session}/video"
     film = FILM + bytes(3_000_000)
     async with clinic.client("clinician") as client:
-        made = await client.put(f"{path}?name=a.webm&consent=true", content=film)
-        assert made.status_code == 201, made.text
+        response = await client.put(f"{path}?name=a.webm&consent=true", content=film)
+        assert response.status_code == 201, response.text
         assert [p.stat().st_size for p in blobs(clinic, patient)] == [len(film)]
         declared = {"content-length": str(clinic.settings.max_file_bytes + 1)}
         refused = await client.put(f"{path}?name=a.webm&consent=true", content=FILM, headers=declared)
@@ -107,11 +111,11 @@ async def test_a_video_is_on_the_page_and_in_no_report_and_goes_with_its_session
     path = f"{API}/sessions/{session}/video"
     async with clinic.client("clinician") as client:
         assert "<take-video" not in (await client.get(f"/sessions/{session}")).text
-        before = len(blobs(clinic, patient))
+        initial_count = len(blobs(clinic, patient))
         for film in (FILM, FILM + b"again"):  # the one that was replaced goes too
             await client.put(f"{path}?name=a.webm&consent=true", content=film)
         assert "<take-video" in (await client.get(f"/sessions/{session}")).text
         assert "video" not in (await client.get(f"/sessions/{session}/print")).text
-        assert len(blobs(clinic, patient)) == before + 2
+        assert len(blobs(clinic, patient)) == initial_count + 2
         assert (await client.delete(f"{API}/sessions/{session}")).status_code == 204
     assert blobs(clinic, patient) == []

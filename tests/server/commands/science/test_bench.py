@@ -39,5 +39,5 @@ def test_the_command_scores_every_algorithm(tmp_path: Path, capsys: pytest.Captu
     assert len(rows) == 1 + 2 * 39
     assert "less than 1 s of rest" in rows[2]
     assert main(["bench", "fusion", str(tmp_path)]) == 0
-    shown = capsys.readouterr().out
-    assert "mean of 1 of 2" in shown
+    visible_stdout = capsys.readouterr().out
+    assert "mean of 1 of 2" in visible_stdout

@@ -20,9 +20,11 @@ from tests.core.body.chain.squats import squat_on
 def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One squat, and its truth as an optical system would give it."""
     folder = tmp_path_factory.mktemp("take")
-    made = squat_on("right", 50.0, MEMS, repetitions=1)
-    truth = JointAngles(made.truth.t_s, made.truth.subtract_standing(), made.truth.zero_offset)
-    (folder / "recording.parquet").write_bytes(write_recording(made.recording))
+    simulation = squat_on("right", 50.0, MEMS, repetitions=1)
+    truth = JointAngles(
+        simulation.truth.t_s, simulation.truth.subtract_standing(), simulation.truth.zero_offset
+    )
+    (folder / "recording.parquet").write_bytes(write_recording(simulation.recording))
     (folder / "angles.parquet").write_bytes(angles_parquet(truth))
     (folder / "truth.json").write_text('{"t_s": 1}')
     return folder
@@ -41,9 +43,9 @@ def test_a_take_with_a_reference_gives_the_tables(
         str(take / "angles.parquet"),
     ]
     assert main([*call, "--measures", str(measures), "--out", str(out)]) == 0
-    said = capsys.readouterr().out.splitlines()
-    assert sum(line.startswith("LTib2Knee") for line in said) == 4
-    assert sum(line.startswith("Yaw-bac") for line in said) == 4
+    message = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith("LTib2Knee") for line in message) == 4
+    assert sum(line.startswith("Yaw-bac") for line in message) == 4
     with out.open() as lines:
         rows = list(csv.DictReader(lines))
     assert len(rows) == 24 * 7
@@ -78,7 +80,7 @@ def test_what_is_missing_is_said(
 @pytest.mark.slow
 def test_a_take_alone_is_held_against_itself(take: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sensitivity", str(take / "recording.parquet"), "--from-standing"]) == 0
-    said = capsys.readouterr().out
-    assert "RMS change of the angles in °" in said
-    assert "RMS error" not in said
-    assert "sensitivity in %" not in said
+    stdout = capsys.readouterr().out
+    assert "RMS change of the angles in °" in stdout
+    assert "RMS error" not in stdout
+    assert "sensitivity in %" not in stdout

@@ -31,8 +31,8 @@ def test_every_kind_of_script_writes_its_recording_and_its_truth(
 ) -> None:
     assert simulate(out=tmp_path, script=script, seed=3) == 0
     assert {f.name for f in (tmp_path / "truth").iterdir()} == truth
-    told = json.loads((tmp_path / "truth" / "truth.json").read_bytes())
-    assert (told["script"], told["seed"]) == (script, 3)
+    document = json.loads((tmp_path / "truth" / "truth.json").read_bytes())
+    assert (document["script"], document["seed"]) == (script, 3)
     file = tmp_path / "recording.parquet"
     recording = read_recording([SourceFile(file.name, file.stat().st_size, file.read_bytes)], None)
     assert recording.protocol == protocol
@@ -50,6 +50,6 @@ def test_an_unknown_script_is_answered_with_all_names(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert simulate(out=tmp_path, script="moonwalk", seed=1) == 2
-    said = capsys.readouterr().err
-    assert all(name in said for name in (*SCRIPTS, *MOVEMENTS))
+    stderr = capsys.readouterr().err
+    assert all(name in stderr for name in (*SCRIPTS, *MOVEMENTS))
     assert not any(tmp_path.iterdir())

@@ -31,29 +31,29 @@ WALKED: Day = (
 
 
 def steps_down(out: Path) -> int:
-    found = json.loads((out / "activity.json").read_bytes())
-    return sum(bout["stairs_down_steps"] for bout in found["bouts"])
+    document = json.loads((out / "activity.json").read_bytes())
+    return sum(bout["stairs_down_steps"] for bout in document["bouts"])
 
 
 @pytest.mark.slow
 def test_own_limits_find_the_stairs_that_the_common_ones_miss(tmp_path: Path) -> None:
-    made = simulate_day(WALKED, 1.7, 3, RecordingSetup(rate_hz=50.0))
+    day = simulate_day(WALKED, 1.7, 3, RecordingSetup(rate_hz=50.0))
     file = tmp_path / "walk.parquet"
-    file.write_bytes(write_recording(made.recording))
-    walks = {p.kind: (p.start_s, p.end_s) for p in made.truth.phases}
+    file.write_bytes(write_recording(day.recording))
+    walks = {p.kind: (p.start_s, p.end_s) for p in day.truth.phases}
     own = tmp_path / "own.json"
     assert stairs([file], level=walks["walk"], up=walks["stairs_up"], down=walks["stairs_down"], out=own) == 0
     analyse([file], out=tmp_path / "common")
     analyse([file], out=tmp_path / "own", config=own)
-    true = sum(walks["stairs_down"][0] <= t <= walks["stairs_down"][1] for t in made.truth.steps_s)
+    true = sum(walks["stairs_down"][0] <= t <= walks["stairs_down"][1] for t in day.truth.steps_s)
     assert steps_down(tmp_path / "common") <= 0.2 * true
     assert steps_down(tmp_path / "own") >= 0.7 * true
 
 
 def test_too_few_steps_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = simulate_day(WALKED[:3], 1.7, 3, RecordingSetup(rate_hz=50.0))
+    day = simulate_day(WALKED[:3], 1.7, 3, RecordingSetup(rate_hz=50.0))
     file = tmp_path / "walk.parquet"
-    file.write_bytes(write_recording(made.recording))
+    file.write_bytes(write_recording(day.recording))
     none = (0.0, 5.0)
     assert stairs([file], level=(10.0, 50.0), up=none, down=none, out=tmp_path / "own.json") == 1
     assert "walk_too_short" in capsys.readouterr().err

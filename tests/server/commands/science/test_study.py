@@ -55,7 +55,7 @@ def test_a_folder_becomes_two_tables_and_a_list_of_failures(
     assert {p: p.stat().st_mtime_ns for p in out.rglob("state.json")} == states
     (folder / "one" / "walk.parquet").write_bytes(b"PAR1 no more")
     assert main(call) == 1
-    assert sum(p.stat().st_mtime_ns != at for p, at in states.items()) == 1
+    assert sum(p.stat().st_mtime_ns != position for p, position in states.items()) == 1
 
 
 def test_a_folder_without_recordings_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

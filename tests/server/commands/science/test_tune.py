@@ -23,8 +23,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def tune(folder: Path, *more: str) -> int:
-    given = ["tune", str(folder), "--algorithm", "mahony_2008", "--out", str(folder / "out" / "tuned.json")]
-    return main([*given, "--validate", "judge", *SMALL, *more])
+    inputs = ["tune", str(folder), "--algorithm", "mahony_2008", "--out", str(folder / "out" / "tuned.json")]
+    return main([*inputs, "--validate", "judge", *SMALL, *more])
 
 
 def test_the_gains_are_written_with_what_they_were_fitted_to(
@@ -36,9 +36,9 @@ def test_the_gains_are_written_with_what_they_were_fitted_to(
     assert set(written["trained"]) == {"a", "b"}
     assert written["magnetometer"] is False
     assert list(written["gains"]) == ["kp", "ki"]
-    said = capsys.readouterr()
-    assert written["verdict"] in said.out
-    assert "100.0 %" in said.err
+    captured = capsys.readouterr()
+    assert written["verdict"] in captured.out
+    assert "100.0 %" in captured.err
     assert not list((folder / "out").glob("*.checkpoint"))
 
 

@@ -1,4 +1,4 @@
-"""The pages of who is not signed in yet."""
+"""Pages without sign-in."""
 
 from __future__ import annotations
 

@@ -18,19 +18,19 @@ pytestmark = pytest.mark.anyio
 
 async def test_accounts_stand_with_role_and_second_factor_for_administrators_alone(clinic: Clinic) -> None:
     person, key = clinic.user("assistant", "hanna"), clinic.settings.second_factor_key
-    who = Identity(clinic.user("admin"), "admin", "", Role.ADMIN, "")
+    identity = Identity(clinic.user("admin"), "admin", "", Role.ADMIN, "")
     async with clinic.client("admin") as client:
-        before = (await client.get("/users")).text
+        initial_text = (await client.get("/users")).text
         with clinic.db.write() as c:
-            made = second_factor.begin(c, key, person, "hanna")
-            second_factor.confirm(c, key, person, pyotp.TOTP(made.secret).now())
-            care_teams.switch_on(c, who, begin_with_past=False)
-        after = (await client.get("/users")).text
-    assert "hanna" in before
-    assert all(words in before for words in ROLE_WORDS.values())
-    assert f'minlength="{MIN_LENGTH}"' in before
-    assert before.count("Remove second factor") == 0
-    assert f"/api/v1/users/{person}/second-factor" in after
-    assert before != after
+            session = second_factor.begin(c, key, person, "hanna")
+            second_factor.confirm(c, key, person, pyotp.TOTP(session.secret).now())
+            care_teams.switch_on(c, identity, begin_with_past=False)
+        final_text = (await client.get("/users")).text
+    assert "hanna" in initial_text
+    assert all(words in initial_text for words in ROLE_WORDS.values())
+    assert f'minlength="{MIN_LENGTH}"' in initial_text
+    assert initial_text.count("Remove second factor") == 0
+    assert f"/api/v1/users/{person}/second-factor" in final_text
+    assert initial_text != final_text
     async with clinic.client("clinician") as client:
         assert (await client.get("/users")).status_code == 403

@@ -29,8 +29,8 @@ async def test_a_name_is_on_paper_only_if_asked_for_by_who_may_and_that_is_a_row
         patient = patients.create(c, None, code="ID-1").id
 
     def printed(role: str, *, named: bool) -> tuple[bool, str | None]:
-        found = name_on_paper(request, clinic.db, settings, who(clinic, role), patient, named=named)
-        return found["may_name"], found["person"].name if found["person"] else None
+        result = name_on_paper(request, clinic.db, settings, who(clinic, role), patient, named=named)
+        return result["may_name"], result["person"].name if result["person"] else None
 
     assert not offers_identity(settings)
     assert printed("clinician", named=True) == (False, None)

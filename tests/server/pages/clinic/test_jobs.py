@@ -34,9 +34,9 @@ async def test_jobs_are_listed_newest_first_with_visit_and_time(clinic: Clinic) 
         upload.keep()
     with clinic.db.write() as c:
         recordings.inspect(c, state.queue, None, session)
-    who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+    identity = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
     with clinic.db.read() as c:
-        waiting, done = list_jobs(c, who)
+        waiting, done = list_jobs(c, identity)
     assert (waiting["word"], waiting["what"], waiting["took"], waiting["live"]) == (
         "Waiting", "Reading the files", None, True,
     )  # fmt: skip

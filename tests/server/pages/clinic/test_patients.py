@@ -1,4 +1,4 @@
-"""The list of patients: speed and change of the latest visit, live takes, what is searched for."""
+"""Patient list: speed and change of the latest visit, live trials, search."""
 
 from __future__ import annotations
 
@@ -76,26 +76,26 @@ async def test_lists_show_a_live_take_from_its_code_to_its_end(clinic: Clinic) -
 async def test_a_row_says_what_it_is_looked_for_by(clinic: Clinic) -> None:
     today = now().date()
     with clinic.db.write() as c:
-        here, planned, nobody = (patients.create(c, None, code=f"K-{k}").id for k in range(3))
-        visit = sessions.create(c, None, here, performed_on=today).id
+        place, planned, nobody = (patients.create(c, None, code=f"K-{k}").id for k in range(3))
+        visit = sessions.create(c, None, place, performed_on=today).id
         programmes.start(c, None, planned, starts_on=today)
 
     def kinds(*, results: bool = True) -> dict[str, set[str]]:
-        who = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
+        identity = Identity(clinic.user("viewer"), "viewer", "", Role.VIEWER, "")
         with clinic.db.read() as c:
-            found = patients.list_patients(c, who, search="K-")
-            rows = list_patients(c, clinic.app.state.reviewed, found, results=results)
+            result = patients.list_patients(c, identity, search="K-")
+            rows = list_patients(c, clinic.app.state.reviewed, result, results=results)
         return {row["id"]: set(row["kinds"]) for row in rows}
 
-    assert kinds() == {here: {"today"}, planned: {"programme"}, nobody: set()}
+    assert kinds() == {place: {"today"}, planned: {"programme"}, nobody: set()}
     state = clinic.app.state
     with receiving.receive(clinic.db, state.blobs, clinic.settings, None, visit, "walk.txt") as upload:
         upload.write(b"x")
         upload.keep()
-    assert kinds()[here] == {"today", "check"}, "sensors are to be checked"
+    assert kinds()[place] == {"today", "check"}, "sensors are to be checked"
     files = dict(analysed.files())
     poor = json.loads(files["analysis.json"]) | {"parameters": []}
-    analysed.finish(clinic, here, visit, files | {"analysis.json": json.dumps(poor).encode()})
-    assert kinds()[here] == {"today", "check"}, "no strides"
-    assert kinds(results=False)[here] == {"today"}
+    analysed.finish(clinic, place, visit, files | {"analysis.json": json.dumps(poor).encode()})
+    assert kinds()[place] == {"today", "check"}, "no strides"
+    assert kinds(results=False)[place] == {"today"}
     assert {key for key, _ in FILTERS if key} == {"today", "check", "programme"}

@@ -47,11 +47,11 @@ def test_weeks_are_counted_without_a_week_nought_and_one_of_them_is_now() -> Non
 def test_what_was_done_is_missing_and_comes_next_is_said() -> None:
     view = view_programme(PLAN, MONDAY)
     assert view["summary"] == "2 of 4 visits done, 1 missing, next T3 on 16 Mar 2026"
-    before, first, empty, third = view["weeks"]
+    initial, first, empty, third = view["weeks"]
     assert first["words"] == "1 of 2 trainings done, 1 missing"
     assert third["words"] == "0 of 1 training completed"
     assert empty["words"] == "0 of 0 trainings completed"
-    assert ([v.label for v in before["assessments"]], before["trainings"]) == (["PRE"], [])
+    assert ([v.label for v in initial["assessments"]], initial["trainings"]) == (["PRE"], [])
     assert [(v["label"], v["shape"], v["word"]) for v in view["visits"]] == [
         (v.label, *STATE_WORDS[v.state]) for v in PLAN.visits
     ]
@@ -61,14 +61,14 @@ async def test_the_page_offers_sessions_that_are_no_visit_yet(clinic: Clinic) ->
     today = now().date()
     with clinic.db.write() as c:
         patient = patients.create(c, None, code="PG-1").id
-        taken, free = (
+        selection, free = (
             sessions.create(c, None, patient, title=t, performed_on=today).id for t in ("Taken", "Free")
         )
         plan = programmes.start(c, None, patient, starts_on=today)
-        programmes.change_visit(c, None, plan.visits[0].id, {"session_id": taken})
+        programmes.change_visit(c, None, plan.visits[0].id, {"session_id": selection})
     async with clinic.client("clinician") as client:
         page = (await client.get(f"/patients/{patient}/programme")).text
         none = (await client.get(f"/patients/{'0' * 32}/programme")).status_code
-    assert page.count(f'value="{taken}"') == 1, "by the visit that it was"
+    assert page.count(f'value="{selection}"') == 1, "by the visit that it was"
     assert page.count(f'value="{free}"') == len(plan.visits)
     assert none == 404

@@ -38,22 +38,22 @@ async def test_an_analysed_visit_is_judged_by_its_data_and_others_by_their_state
     reviewed = clinic.app.state.reviewed
     with clinic.db.write() as c:
         s = sessions.get(c, session)
-        found = analyses.get_shown(c, session)
-        edits = edit_log.edits_of_all(c, [found.id])
+        analysis = analyses.get_shown(c, session)
+        edits = edit_log.edits_of_all(c, [analysis.id])
         take, _ = live.open_take(c, None, session)
-    kind, text = reviewed.read_verdict(found, edits[found.id])
-    assert judge_visit(reviewed, s, found, edits) == {"kind": kind, "text": text}
+    kind, text = reviewed.read_verdict(analysis, edits[analysis.id])
+    assert judge_visit(reviewed, s, analysis, edits) == {"kind": kind, "text": text}
     assert text != STATES["done"][1]
     running = replace(s, state="running")
-    assert judge_visit(reviewed, running, found, edits) == describe_state("running")
+    assert judge_visit(reviewed, running, analysis, edits) == describe_state("running")
     assert judge_visit(reviewed, s, None, edits) == describe_state("done")
-    without = replace(found, files={})
+    without = replace(analysis, files={})
     assert judge_visit(reviewed, s, without, edits) == describe_state("done")
-    damaged = replace(found, id="0" * 32, files={"analysis.json": Blob("0" * 64, 9)})
-    unreadable = judge_visit(reviewed, s, damaged, {"0" * 32: edits[found.id]})
+    damaged = replace(analysis, id="0" * 32, files={"analysis.json": Blob("0" * 64, 9)})
+    unreadable = judge_visit(reviewed, s, damaged, {"0" * 32: edits[analysis.id]})
     assert unreadable == {"kind": "bad", "text": "Cannot be read"}
-    told = describe_live(live_record(clinic, take.id))
-    assert told == {"session": session, "kind": "none", "text": "Waiting for the tablet"}
+    sentence = describe_live(live_record(clinic, take.id))
+    assert sentence == {"session": session, "kind": "none", "text": "Waiting for the tablet"}
 
 
 def live_record(clinic: Clinic, take: str) -> live.LiveTakeRecord:

@@ -16,10 +16,10 @@ pytestmark = pytest.mark.anyio
 
 async def test_it_needs_no_sign_in_and_no_other_page_may_use_a_camera(clinic: Clinic) -> None:
     async with clinic.client() as client:
-        page, other = await client.get("/capture"), await client.get("/sign-in")
+        page, other_response = await client.get("/capture"), await client.get("/sign-in")
     assert page.status_code == 200
     assert "camera=(self)" in page.headers["permissions-policy"]
-    assert "camera=()" in other.headers["permissions-policy"]
+    assert "camera=()" in other_response.headers["permissions-policy"]
     assert "".join(re.findall(r'data-key="(\w)"', page.text)) == ALPHABET
     assert f'maxlength="{CODE_LENGTH + 1}"' in page.text  # and the space in the middle
     assert str(clinic.settings.max_file_bytes) in page.text

@@ -1,4 +1,4 @@
-"""What the live page knows of a guided test before it begins."""
+"""Guided test on the live page before its start."""
 
 from __future__ import annotations
 
@@ -44,17 +44,20 @@ def view(protocol: Any, patient: Patient = PATIENT) -> dict[str, Any] | None:
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_every_guided_test_has_words_and_no_other_session(protocol: Any) -> None:
-    shown = view(protocol)
+    visible_view = view(protocol)
     if protocol not in TOTAL:
-        assert shown is None
+        assert visible_view is None
         return
-    assert shown is not None
-    assert (shown["total"], shown["label"]) == (TOTAL[protocol], CATALOGUE[TOTAL[protocol]].label)
-    assert shown["hint"] == HINTS[protocol]
-    assert all(shown[key] for key in ("title", "say", "meant"))
-    assert shown["go"] == protocol.startswith("standing")
-    assert shown["rises"] == (protocol == "five_sit_to_stand")
-    assert shown["norm"] == norm_words(TOTAL[protocol], 76, "female")
+    assert visible_view is not None
+    assert (visible_view["total"], visible_view["label"]) == (
+        TOTAL[protocol],
+        CATALOGUE[TOTAL[protocol]].label,
+    )
+    assert visible_view["hint"] == HINTS[protocol]
+    assert all(visible_view[key] for key in ("title", "say", "meant"))
+    assert visible_view["go"] == protocol.startswith("standing")
+    assert visible_view["rises"] == (protocol == "five_sit_to_stand")
+    assert visible_view["norm"] == norm_words(TOTAL[protocol], 76, "female")
 
 
 def test_the_norm_is_of_the_age_at_the_visit() -> None:

@@ -24,8 +24,12 @@ async def test_a_comparison_is_chosen_followed_and_shown_with_its_files(clinic: 
         patient = patients.create(c, None, code="AL-1").id
         session = sessions.create(c, None, patient).id
     with clinic.db.read() as c:
-        before = list_choices(c, session)
-    assert (before["analysed"], before["work"], before["chosen"]) == (False, None, PROPOSED)
+        initial_choices = list_choices(c, session)
+    assert (initial_choices["analysed"], initial_choices["work"], initial_choices["chosen"]) == (
+        False,
+        None,
+        PROPOSED,
+    )
     analysed.finish(clinic, patient, session, analysed.files())
     with clinic.db.write() as c:
         filter_runs.submit(

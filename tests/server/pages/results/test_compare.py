@@ -24,16 +24,16 @@ def test_a_title_that_rows_share_stands_once() -> None:
 async def test_the_earlier_visit_stands_first_and_the_same_walk_has_not_changed(clinic: Clinic) -> None:
     ((first, last),) = crowd.fill(clinic, 1, 2, analysed.files())
     with clinic.db.read() as c:
-        found = comparisons.pair(c, last, first)
-    assert (found.before.session.id, found.after.session.id) == (first, last)
-    view = view_comparison(clinic.app.state.reviewed, found)
+        pair = comparisons.pair(c, last, first)
+    assert (pair.before.session.id, pair.after.session.id) == (first, last)
+    view = view_comparison(clinic.app.state.reviewed, pair)
     assert view["used"]["before"] == view["used"]["after"]
     assert view["real"] == []
     assert len(view["charts"]) >= 4
-    shown = [row for _, rows in (*view["groups"], *view["more"]) for row, _ in rows]
-    assert {row.change.difference for row in shown if row.change.difference is not None} == {0.0}
+    visible_rows = [row for _, rows in (*view["groups"], *view["more"]) for row, _ in rows]
+    assert {row.change.difference for row in visible_rows if row.change.difference is not None} == {0.0}
     assert view["figure"] is True
-    patient = found.patient.id
+    patient = pair.patient.id
     compare = f"/patients/{patient}/compare"
     async with clinic.client("viewer") as client:
         for ticked, led in (

@@ -1,4 +1,4 @@
-"""Pages of daily life: the session, the week report, and the trends beside the clinic's walks."""
+"""Daily-life pages: session, week report, trends compared with clinic walks."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ async def visits(clinic: Clinic) -> dict[str, str]:
     """A patient with a walk in the clinic and eight days at home; the ids of patient and visits."""
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "HOME"})).json()["id"]
-        asked = {"title": "Clinic", "protocol": "walk", "performed_on": "2026-11-10"}
-        walk = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()["id"]
-        asked = {"title": "Week at home", "protocol": "activity", "performed_on": "2026-11-24"}
-        week = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()["id"]
+        requests = {"title": "Clinic", "protocol": "walk", "performed_on": "2026-11-10"}
+        walk = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()["id"]
+        requests = {"title": "Week at home", "protocol": "activity", "performed_on": "2026-11-24"}
+        week = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()["id"]
     analysed.finish(clinic, patient, walk, analysed.files())
     analysed.finish(clinic, patient, week, daily.files(daily.live(7.5)))
     return {"patient": patient, "walk": walk, "week": week}
@@ -35,8 +35,8 @@ async def page(clinic: Clinic, path: str) -> str:
 
 def cut_card(html: str, name: str) -> str:
     """The card under a heading."""
-    rest = html[html.index(f'id="{name}"') :]
-    return rest[: rest.index("</section>")]
+    remainder = html[html.index(f'id="{name}"') :]
+    return remainder[: remainder.index("</section>")]
 
 
 @pytest.mark.slow
@@ -96,13 +96,13 @@ async def test_pages_of_a_walk_lead_to_the_days(clinic: Clinic, visits: dict[str
 
 async def test_the_api_tells_the_days(clinic: Clinic, visits: dict[str, str]) -> None:
     async with clinic.client("admin") as client:
-        found = (await client.get(f"/api/v1/sessions/{visits['week']}/report")).json()
+        body = (await client.get(f"/api/v1/sessions/{visits['week']}/report")).json()
         walk = (await client.get(f"/api/v1/sessions/{visits['walk']}/report")).json()
     assert walk["daily"] is None
-    assert len(found["daily"]["days"]) == 9
-    assert found["daily"]["days"][1]["minutes"]["lying"] == pytest.approx(480.0)
-    assert found["daily"]["sub_threshold"] == 1
-    assert "daily_step_count" in {p["name"] for p in found["parameters"]}
+    assert len(body["daily"]["days"]) == 9
+    assert body["daily"]["days"][1]["minutes"]["lying"] == pytest.approx(480.0)
+    assert body["daily"]["sub_threshold"] == 1
+    assert "daily_step_count" in {p["name"] for p in body["parameters"]}
 
 
 async def test_trends_show_the_clinic_beside_home(clinic: Clinic, visits: dict[str, str]) -> None:
@@ -124,9 +124,9 @@ async def test_trends_show_the_clinic_beside_home(clinic: Clinic, visits: dict[s
 async def test_trends_of_daily_life_alone_say_that_capacity_is_unknown(clinic: Clinic) -> None:
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "ALONE"})).json()["id"]
-        asked = {"title": "At home", "protocol": "activity"}
-        made = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()
-    analysed.finish(clinic, patient, made["id"], daily.files(daily.live(2.0)))
+        requests = {"title": "At home", "protocol": "activity"}
+        body = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()
+    analysed.finish(clinic, patient, body["id"], daily.files(daily.live(2.0)))
     html = await page(clinic, f"/patients/{patient}/trends")
     card = cut_card(html, "h-daily")
     assert "capacity is not known" in card

@@ -43,10 +43,10 @@ async def test_a_contact_of_the_affected_side_is_drawn_with_its_caption(
         middle = mine[len(mine) // 2]
         assert len(mine) > 3
         assert drawn["svg"] == draw_still(poses, middle.start_s, side, drawn["caption"])
-    counted = [s for s in strides.strides if s.excluded_reason is None]
+    counted_strides = [s for s in strides.strides if s.excluded_reason is None]
     any_side = draw_contact(reviewed, this, strides, patient)
     assert any_side is not None
-    assert any_side["caption"] == f"Contact, {counted[len(counted) // 2].side} foot"
+    assert any_side["caption"] == f"Contact, {counted_strides[len(counted_strides) // 2].side} foot"
     model = reports.read(reviewed, this.found, this.edits, patient, this.session)[1]
     first = draw_beginning(reviewed, this, model)
     assert first is not None

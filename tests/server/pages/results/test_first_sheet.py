@@ -42,12 +42,12 @@ def test_the_profile_stands_on_the_first_sheet_where_it_has_room() -> None:
 
 def walked(files: Mapping[str, bytes], speed_mps: float | None) -> dict[str, bytes]:
     """The same walk at another speed, or too short for one."""
-    found = json.loads(files["analysis.json"])
-    for row in found["parameters"]:
+    document = json.loads(files["analysis.json"])
+    for row in document["parameters"]:
         if row["name"] == "gait_speed_mps":
             row |= dict.fromkeys(("mean", "sd", "ci_low", "ci_high"), speed_mps)
             row["reason"] = None if speed_mps else "few_strides"
-    return {**files, "analysis.json": json.dumps(found).encode()}
+    return {**files, "analysis.json": json.dumps(document).encode()}
 
 
 async def add_visits(
@@ -56,15 +56,15 @@ async def add_visits(
     files: Mapping[str, bytes],
     visits: Sequence[tuple[float | None, dict[str, Any]]],
 ) -> str:
-    """A patient with visits four weeks apart, each with its speed and what is said of it; the last id."""
+    """Patient with visits four weeks apart, each with speed and conditions; return the last id."""
     session = ""
     async with clinic.client("clinician") as client:
         person = {"code": code, "height_m": 1.75, "sex": "male", "birth_year": 1961}
         patient = (await client.post("/api/v1/patients", json=person)).json()["id"]
-        for back, (speed_mps, said) in zip(range(len(visits) - 1, -1, -1), visits, strict=True):
+        for back, (speed_mps, message) in zip(range(len(visits) - 1, -1, -1), visits, strict=True):
             day = (DAY - dt.timedelta(days=28 * back)).isoformat()
-            asked = {"title": "Walk", "performed_on": day, **said}
-            session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=asked)).json()["id"]
+            requests = {"title": "Walk", "performed_on": day, **message}
+            session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=requests)).json()["id"]
             analysed.finish(clinic, patient, session, walked(files, speed_mps))
     return session
 
@@ -73,12 +73,12 @@ async def read_trend(clinic: Clinic, session: str, language: str = "en") -> list
     """The rows of the trend on the print page as text, None without one."""
     async with clinic.client("viewer", {"accept-language": language}) as client:
         html = (await client.get(f"/sessions/{session}/print")).text
-    found = re.search(r'<table class="tbl r-tbl r-trend">(.*?)</table>(.*?)</section>', html, re.DOTALL)
-    if found is None:
+    match = re.search(r'<table class="tbl r-tbl r-trend">(.*?)</table>(.*?)</section>', html, re.DOTALL)
+    if match is None:
         return None
-    rows = re.findall(r"<tr>(.*?)</tr>", found[1], re.DOTALL)
+    rows = re.findall(r"<tr>(.*?)</tr>", match[1], re.DOTALL)
     texts = [[plain(c) for c in re.findall(r"<t[hd].*?>(.*?)</t[hd]>", row, re.DOTALL)] for row in rows]
-    return [*texts, [plain(found[2])]]
+    return [*texts, [plain(match[2])]]
 
 
 def plain(html: str) -> str:
@@ -90,14 +90,14 @@ async def test_the_trend_follows_visits_walked_alike_from_the_third_on(clinic: C
     files = analysed.files()
     two = await add_visits(clinic, "T-2", files, [(0.5, {}), (0.6, {})])
     assert await read_trend(clinic, two) is None
-    other: list[tuple[float | None, dict[str, Any]]] = [
+    second: list[tuple[float | None, dict[str, Any]]] = [
         (0.5, {}),
         (1.9, {"pace": "fast"}),
         (0.55, {}),
         (1.8, {"feedback": True}),
         (0.7, {}),
     ]
-    mixed = await read_trend(clinic, await add_visits(clinic, "T-3", files, other))
+    mixed = await read_trend(clinic, await add_visits(clinic, "T-3", files, second))
     assert mixed is not None
     assert mixed[0] == ["Trend same condition", "29 Jul 2026", "23 Sep 2026", "18 Nov 2026", "",
                         "Since the first visit"]  # fmt: skip
@@ -118,11 +118,11 @@ async def test_a_change_since_a_later_visit_than_the_first_says_so(
     monkeypatch.setattr(comparisons, "classify_visit", lambda s, _: s.title)
     kinds = [(0.5, "training"), (0.8, "assessment"), (0.9, "training")]
     visits = [(speed, {"title": kind}) for speed, kind in kinds]
-    found = await read_trend(clinic, await add_visits(clinic, "T-70", analysed.files(), visits))
-    assert found is not None
-    assert found[1][1:4] == ["0.50", "0.80", "0.90"]
-    assert found[1][-1].startswith("+0.10")
-    assert found[-1][0].startswith("Gait speed: change since 21 Oct 2026.")
+    trend = await read_trend(clinic, await add_visits(clinic, "T-70", analysed.files(), visits))
+    assert trend is not None
+    assert trend[1][1:4] == ["0.50", "0.80", "0.90"]
+    assert trend[1][-1].startswith("+0.10")
+    assert trend[-1][0].startswith("Gait speed: change since 21 Oct 2026.")
 
 
 @pytest.mark.sweep
@@ -131,22 +131,22 @@ async def test_the_takes_of_a_day_are_one_visit_of_the_trend(clinic: Clinic) -> 
     first = {"performed_on": "2026-09-23"}
     twice: list[tuple[float | None, dict[str, Any]]] = [(0.5, first), (0.6, first), (0.7, {})]
     assert await read_trend(clinic, await add_visits(clinic, "T-71", files, twice)) is None
-    found = await read_trend(
+    trend = await read_trend(
         clinic, await add_visits(clinic, "T-72", files, [(0.4, first), *twice, (0.8, {})])
     )
-    assert found is not None
-    assert found[1][1:-2] == ["0.60", "0.70", "0.80"]
+    assert trend is not None
+    assert trend[1][1:-2] == ["0.60", "0.70", "0.80"]
 
 
 @pytest.mark.sweep
 async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clinic) -> None:
     files = analysed.files()
     late = await add_visits(clinic, "T-5", files, [(None, {}), (0.5, {}), (0.58, {})])
-    found = await read_trend(clinic, late)
-    assert found is not None
-    assert found[1][1:] == ["–", "0.50", "0.58", "", "+0.08 within error MDC 0.15"]
+    trend = await read_trend(clinic, late)
+    assert trend is not None
+    assert trend[1][1:] == ["–", "0.50", "0.58", "", "+0.08 within error MDC 0.15"]
     reason = "not measured: requires at least 10 included strides"
-    assert found[-1] == [f"No value: 23 Sep 2026, {reason}. Gait speed: change since 21 Oct 2026."]
+    assert trend[-1] == [f"No value: 23 Sep 2026, {reason}. Gait speed: change since 21 Oct 2026."]
     lacking = await read_trend(clinic, await add_visits(clinic, "T-6", files, [(0.5, {})] * 9 + [(None, {})]))
     assert lacking is not None
     # of ten visits the first and the last four, the others are in the drawn line
@@ -162,13 +162,13 @@ async def test_a_visit_without_the_number_has_a_dash_and_the_reason(clinic: Clin
 async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
     clinic: Clinic, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As many lines above, and as long a text of the therapist, as go beside the profile."""
+    """As many lines and as long an assessment as fit next to the profile."""
     if ctypes.util.find_library("pangoft2-1.0") is None:
         pytest.skip("the system library Pango is not installed")
-    asked: list[tuple[Mapping[str, Any], str]] = []
+    requests: list[tuple[Mapping[str, Any], str]] = []
 
     def listen(report: Mapping[str, Any], assessment: str, note: str) -> bool:
-        asked.append((report, assessment))
+        requests.append((report, assessment))
         return has_room_for_profile(report, assessment, note)
 
     monkeypatch.setattr(session_page, "has_room_for_profile", listen)
@@ -179,7 +179,9 @@ async def test_all_that_the_doctor_reads_stands_on_one_sheet_in_german(
     async with clinic.client("clinician", {"accept-language": "de"}) as client:
         await client.put(f"/api/v1/sessions/{session}/assessment", json={"content": text})
         await client.get(f"/sessions/{session}/print")
-        note = next(n for n in ("x " * k for k in range(700, 0, -1)) if has_room_for_profile(*asked[-1], n))
+        note = next(
+            n for n in ("x " * k for k in range(700, 0, -1)) if has_room_for_profile(*requests[-1], n)
+        )
         await client.patch(f"/api/v1/sessions/{session}", json={"note": note})
         answer = await client.get(f"/sessions/{session}/report.pdf")
     pages = pypdfium2.PdfDocument(io.BytesIO(answer.content))

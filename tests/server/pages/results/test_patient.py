@@ -18,22 +18,22 @@ API = "/api/v1"
 
 
 async def walked(clinic: Clinic, code: str, walks: Sequence[tuple[str, float, dict[str, Any]]]) -> list[str]:
-    """A patient with analysed walks of a day, a speed and more that is said of the session; their ids."""
-    made = []
+    """Patient with analysed walks of a day, with speed and conditions; return their ids."""
+    result = []
     async with clinic.client("admin") as client:
         patient = (await client.post(f"{API}/patients", json={"code": code})).json()["id"]
         for day, speed, more in walks:
             body = {"title": f"Walk at {speed}", "performed_on": day, "pace": "comfortable", **more}
             session = (await client.post(f"{API}/patients/{patient}/sessions", json=body)).json()["id"]
             files = dict(analysed.files())
-            found = json.loads(files["analysis.json"])
-            for p in found["parameters"]:
+            document = json.loads(files["analysis.json"])
+            for p in document["parameters"]:
                 if p["name"] == "gait_speed_mps":
                     p |= {"mean": speed, "sd": 0.02, "n": 40, "ci_low": speed - 0.01, "ci_high": speed + 0.01}
-            files["analysis.json"] = json.dumps(found).encode()
+            files["analysis.json"] = json.dumps(document).encode()
             analysed.finish(clinic, patient, session, files)
-            made.append(session)
-    return [patient, *made]
+            result.append(session)
+    return [patient, *result]
 
 
 async def text_of(clinic: Clinic, path: str, role: str = "admin") -> str:
@@ -109,8 +109,8 @@ async def test_notes_stand_by_date_beside_those_of_visits_and_go_with_the_patien
             ("2026-02-20", "clinician"),
         ]
         html = (await client.get(f"/patients/{patient}")).text
-        told = [html.index(s) for s in ("New orthosis.", "Tired after six", "Wants to walk")]
-        assert told == sorted(told)
+        indexes = [html.index(s) for s in ("New orthosis.", "Tired after six", "Wants to walk")]
+        assert indexes == sorted(indexes)
         gone = await client.delete(f"{API}/notes/{listed[0]['id']}")
         assert gone.status_code == 204
         assert "New orthosis." not in (await client.get(f"/patients/{patient}")).text

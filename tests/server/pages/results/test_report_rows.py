@@ -1,4 +1,4 @@
-"""Which rows of the parameter table stand where."""
+"""Placement of rows in the parameter table."""
 
 from __future__ import annotations
 
@@ -48,8 +48,8 @@ def model(*rows: ParameterRow, **more: Any) -> Any:
 def test_ten_of_those_that_matter_come_first_in_their_order() -> None:
     rows = [row(name) for name in reversed(MATTERING)]
     rows[-2] = row(MATTERING[1], reason="not measured")
-    found = names(select_first(model(*rows, row("swing_pct"))))
-    assert found == [MATTERING[0], *MATTERING[2 : FIRST_ROWS + 1]]
+    result = names(select_first(model(*rows, row("swing_pct"))))
+    assert result == [MATTERING[0], *MATTERING[2 : FIRST_ROWS + 1]]
     assert names(select_first(model(row("swing_pct")))) == []
 
 

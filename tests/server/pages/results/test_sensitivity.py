@@ -1,4 +1,4 @@
-"""The page that says how sure the angles of squats are."""
+"""Sensitivity page of squat angles."""
 
 from __future__ import annotations
 
@@ -24,14 +24,18 @@ async def test_only_tables_can_be_held_against_and_the_analysis_is_named(clinic:
             assert put.is_success, put.text
         assert (await client.get(path)).status_code == 403
     with clinic.db.read() as c:
-        before = list_choices(c, session)
+        initial_choices = list_choices(c, session)
         assert len(reference_files.list_files(c, session)) == 2
-    assert (before["analysed"], before["work"], before["view"]) == (None, None, None)
+    assert (initial_choices["analysed"], initial_choices["work"], initial_choices["view"]) == (
+        None,
+        None,
+        None,
+    )
     done = analysed.finish(clinic, patient, session, analysed.files())
     with clinic.db.read() as c:
-        after = list_choices(c, session)
-    assert after["analysed"] == done
-    assert after["references"] == before["references"] == ["Angles.PARQUET"]
+        final_choices = list_choices(c, session)
+    assert final_choices["analysed"] == done
+    assert final_choices["references"] == initial_choices["references"] == ["Angles.PARQUET"]
     async with clinic.client("clinician") as client:
         page = await client.get(f"{path}?run=nothing&show=step")
     assert page.status_code == 200

@@ -19,11 +19,11 @@ async def test_what_is_chosen_stands_in_the_page_and_in_the_address_of_the_table
 ) -> None:
     with clinic.db.write() as c:
         patient = patients.create(c, None, code="ST-1").id
-        made = [
+        ids = [
             sessions.create(c, None, patient, title=title, performed_on=dt.date(2026, month, 1)).id
             for title, month in (("Winter", 1), ("Spring", 4))
         ]
-    for session in made:
+    for session in ids:
         analysed.finish(clinic, patient, session, analysed.files())
     async with clinic.client("clinician") as client:
         whole = (await client.get("/study")).text
@@ -33,7 +33,7 @@ async def test_what_is_chosen_stands_in_the_page_and_in_the_address_of_the_table
     assert [t in whole for t in ("Winter", "Spring")] == [True, True]
     assert [t in since for t in ("Winter", "Spring")] == [False, True]
     assert [t in nothing for t in ("Winter", "Spring")] == [False, False]
-    assert [sid in since for sid in made] == [False, True]
+    assert [sid in since for sid in ids] == [False, True]
     assert ("download>" in since, 'name="ticked" value="true"' in since) == (False, True)
     # of more visits than can be ticked the choice is in the address
     monkeypatch.setattr(study, "TICKED_AT_MOST", 0)

@@ -1,4 +1,4 @@
-"""The takes of one visit beside each other."""
+"""Trials of one visit compared."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ pytestmark = pytest.mark.anyio
 async def test_takes_of_a_day_stand_beside_each_other_with_their_mean(clinic: Clinic) -> None:
     with clinic.db.write() as c:
         pid = patients.create(c, None, code="TK-1").id
-        one, other, alone = (
+        one, second, single = (
             sessions.create(c, None, pid, title=title, performed_on=dt.date(2026, 3, day)).id
             for title, day in (("One", 2), ("Other", 2), ("Alone", 9))
         )
-    for sid in (one, other, alone):
+    for sid in (one, second, single):
         analysed.finish(clinic, pid, sid, analysed.files())
     with clinic.db.read() as c:
         patient = patients.get(c, pid)
         done = histories.list_analysed(c, pid)
     reviewed = clinic.app.state.reviewed
-    this = next(a for a in done if a.session.id == other)
+    this = next(a for a in done if a.session.id == second)
     first = select_first(reports.read(reviewed, this.found, this.edits, patient, this.session)[1])
-    assert view_takes(reviewed, done, alone, first) is None
-    assert view_takes(reviewed, done, other, ()) == {
+    assert view_takes(reviewed, done, single, first) is None
+    assert view_takes(reviewed, done, second, ()) == {
         "columns": [
             {"id": one, "title": "One", "this": False},
-            {"id": other, "title": "Other", "this": True},
+            {"id": second, "title": "Other", "this": True},
         ],
         "rows": [],
     }
-    view = view_takes(reviewed, done, other, first)
+    view = view_takes(reviewed, done, second, first)
     assert view is not None
     speed = next(r for r in view["rows"] if r["title"] == find_term("gait_speed_mps").label)
     assert (speed["unit"], speed["side"]) == ("m/s", None)

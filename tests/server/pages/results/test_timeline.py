@@ -18,12 +18,12 @@ async def test_numbers_follow_an_edit_and_only_who_may_review_edits(clinic: Clin
         session, empty = (sessions.create(c, None, patient).id for _ in range(2))
     analysed.finish(clinic, patient, session, analysed.files())
     path = f"/sessions/{session}/timeline"
-    asked = {FRAGMENT: "numbers"}
+    requests = {FRAGMENT: "numbers"}
     async with clinic.client("clinician") as client:
         page = await client.get(path)
         without = await client.get(f"/sessions/{empty}/timeline")
         plain = await client.get(f"{path}/numbers")
-        before = await client.get(f"{path}/numbers", headers=asked)
+        initial_response = await client.get(f"{path}/numbers", headers=requests)
         report = (await client.get(f"/api/v1/sessions/{session}/report")).json()
         used, every = sum(s["used"] for s in report["strides"]), len(report["strides"])
         stride = next(s for s in report["strides"] if s["used"])
@@ -33,12 +33,12 @@ async def test_numbers_follow_an_edit_and_only_who_may_review_edits(clinic: Clin
         }  # fmt: skip
         done = await client.post(f"/api/v1/sessions/{session}/edits", json=edit)
         assert done.is_success, done.text
-        after = await client.get(f"{path}/numbers", headers=asked)
+        final_response = await client.get(f"{path}/numbers", headers=requests)
     assert (page.status_code, without.status_code) == (200, 200)
     assert (plain.status_code, plain.headers["location"]) == (303, f"{path}#numbers")
-    assert f"{used} of {every} included" in before.text
-    assert f"{used - 1} of {every} included" in after.text
-    assert "<html" not in before.text
+    assert f"{used} of {every} included" in initial_response.text
+    assert f"{used - 1} of {every} included" in final_response.text
+    assert "<html" not in initial_response.text
     async with clinic.client("assistant") as client:
         assert (await client.get(path)).status_code == 403
     async with clinic.client("admin") as client:

@@ -1,4 +1,4 @@
-"""Figures over the visits of a patient: which line stands for a figure, and what is said meanwhile."""
+"""Trends of a patient: lines per parameter and status messages."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def line(side: Any, *values: float, base: int | None = 0, estimated: tuple[bool,
 
 
 def trend(*lines: TrendSeries, norm: float | None = None) -> Any:
-    known: Any = None if norm is None else SimpleNamespace(mean=norm)
-    return Trend("stance_pct", SimpleNamespace(), lines, known)  # type: ignore[arg-type]
+    reference: Any = None if norm is None else SimpleNamespace(mean=norm)
+    return Trend("stance_pct", SimpleNamespace(), lines, reference)  # type: ignore[arg-type]
 
 
 def test_the_affected_side_stands_for_a_figure_else_the_one_further_from_the_norm() -> None:
@@ -64,8 +64,10 @@ def test_a_visit_says_whether_it_was_a_training() -> None:
 
 def test_assessments_ahead_are_of_the_newest_programme() -> None:
     def plan(*visits: tuple[str, Any, Any]) -> Any:
-        made = [PlannedVisit(label, label, kind, 1, DAY, None, None, state) for label, kind, state in visits]
-        return SimpleNamespace(visits=made)
+        result = [
+            PlannedVisit(label, label, kind, 1, DAY, None, None, state) for label, kind, state in visits
+        ]
+        return SimpleNamespace(visits=result)
 
     newest = plan(
         ("PRE", "assessment", "done"), ("MID", "assessment", "missing"), ("T1", "training", "next"),

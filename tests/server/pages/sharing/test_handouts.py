@@ -1,4 +1,4 @@
-"""What is handed out beside the report."""
+"""Handouts accompanying the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A signed report stays as it was signed, and is read by a link only as long and by whom it was meant for."""
+"""Signed reports are immutable; links expire and reach only their recipients."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ async def sign(clinic: Clinic, session: str, role: str = "clinician") -> str:
     async with clinic.client(role) as client:
         answer = await client.post(f"/sessions/{session}/report/sign", json={})
     assert answer.status_code == 201, answer.text
-    found: str = answer.json()["id"]
-    return found
+    result: str = answer.json()["id"]
+    return result
 
 
 async def archived(clinic: Clinic, session: str) -> tuple[bytes, bool] | None:
@@ -44,8 +44,8 @@ async def archived(clinic: Clinic, session: str) -> tuple[bytes, bool] | None:
     async with clinic.client("viewer") as client:
         answer = await client.get(f"/api/v1/sessions/{session}/archive.zip")
     with zipfile.ZipFile(io.BytesIO(answer.content)) as opened:
-        told = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
-        return None if told is None else (opened.read("report/report.html"), told["of_these_numbers"])
+        data = json.loads(opened.read("sagittal-episode.json"))["signed_report"]
+        return None if data is None else (opened.read("report/report.html"), data["of_these_numbers"])
 
 
 async def write(clinic: Clinic, session: str, text: str) -> int:
@@ -66,25 +66,25 @@ async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Cl
     assert "Plan: &lt;b&gt;longer&lt;/b&gt; steps." in paper
     assert "not signed" in paper
     report = await sign(clinic, session)
-    before = await page(clinic, f"/signed-reports/{report}")
-    assert "Signed, version 1" in before
-    assert "Walks faster." in before
-    assert not re.search(r"<script|<link|href=\"/", before)
-    assert await archived(clinic, session) == (before.encode(), True)
+    initial = await page(clinic, f"/signed-reports/{report}")
+    assert "Signed, version 1" in initial
+    assert "Walks faster." in initial
+    assert not re.search(r"<script|<link|href=\"/", initial)
+    assert await archived(clinic, session) == (initial.encode(), True)
     # locked: neither its text nor another signature, until somebody says why
     assert await write(clinic, session, "Something else") == 409
     async with clinic.client("clinician") as client:
-        again = await client.post(f"/sessions/{session}/report/sign", json={})
+        second_response = await client.post(f"/sessions/{session}/report/sign", json={})
         listed = (await client.get(f"/api/v1/sessions/{session}/signed-reports")).json()
-    assert again.json()["code"] == "report_signed"
-    assert listed[0]["sha256"] == hashlib.sha256(before.encode()).hexdigest()
+    assert second_response.json()["code"] == "report_signed"
+    assert listed[0]["sha256"] == hashlib.sha256(initial.encode()).hexdigest()
     async with clinic.client("clinician") as client:
         (await client.patch(f"/api/v1/sessions/{session}", json={"title": "Another"})).raise_for_status()
-        asked = {"config": {"poses": {"estimator": "kinematic"}}}
-        (await client.post(f"/api/v1/sessions/{session}/analyses", json=asked)).raise_for_status()
+        requests = {"config": {"poses": {"estimator": "kinematic"}}}
+        (await client.post(f"/api/v1/sessions/{session}/analyses", json=requests)).raise_for_status()
     analysed.publish_next(clinic, session, analysed.files(14.0))
-    assert await page(clinic, f"/signed-reports/{report}") == before
-    assert await archived(clinic, session) == (before.encode(), False)
+    assert await page(clinic, f"/signed-reports/{report}") == initial
+    assert await archived(clinic, session) == (initial.encode(), False)
     assert "Another" in await page(clinic, f"/sessions/{session}/print")
     async with clinic.client("clinician") as client:
         empty = await client.post(f"/api/v1/signed-reports/{report}/reopen", json={"reason": " "})
@@ -97,7 +97,7 @@ async def test_a_signed_report_keeps_its_bytes_while_the_page_follows(clinic: Cl
     desk = await page(clinic, f"/sessions/{session}/report")
     assert "Version 2" in desk
     assert "Typing error" in desk
-    assert await page(clinic, f"/signed-reports/{report}") == before
+    assert await page(clinic, f"/signed-reports/{report}") == initial
 
 
 async def test_an_assessment_longer_than_its_room_is_refused_and_the_earlier_one_stays(
@@ -140,14 +140,14 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
         changed = {"title": "Walk of Jane Doe", "note": "Jane Doe"}
         (await client.patch(f"/api/v1/sessions/{session}", json=changed)).raise_for_status()
         report = await sign(clinic, session)
-        made = await client.post(f"/api/v1/signed-reports/{report}/links", json={"days": 3})
+        response = await client.post(f"/api/v1/signed-reports/{report}/links", json={"days": 3})
         too_long = await client.post(f"/api/v1/signed-reports/{report}/links", json={"days": 91})
-    assert (made.status_code, too_long.status_code) == (201, 422)
-    url, token = made.json()["url"], made.json()["url"].rpartition("/")[2]
-    assert made.json()["qr"].startswith("data:image/svg+xml")
+    assert (response.status_code, too_long.status_code) == (201, 422)
+    url, token = response.json()["url"], response.json()["url"].rpartition("/")[2]
+    assert response.json()["qr"].startswith("data:image/svg+xml")
     async with clinic.client() as stranger:
-        answer, again = await stranger.get(url), await stranger.get(url)
-    assert answer.status_code == again.status_code == 200
+        answer, second_response = await stranger.get(url), await stranger.get(url)
+    assert answer.status_code == second_response.status_code == 200
     for secret in ("S-3-CODE", "Jane", patient, session, token):
         assert secret not in answer.text
     assert answer.headers["referrer-policy"] == "no-referrer"
@@ -156,10 +156,10 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
     assert answer.headers["content-security-policy"].startswith("default-src 'none'; style-src 'sha256-")
     with clinic.db.read() as c:
         stored = c.execute(sa.select(report_link)).mappings().one()
-        said = c.execute(sa.select(audit.c.action, audit.c.detail).order_by(audit.c.seq)).all()
+        mask = c.execute(sa.select(audit.c.action, audit.c.detail).order_by(audit.c.seq)).all()
     assert token not in str(dict(stored))
-    assert token not in str(said)
-    assert [a for a, _ in said if a.startswith("report_link.")] == ["report_link.made", "report_link.opened"]
+    assert token not in str(mask)
+    assert [a for a, _ in mask if a.startswith("report_link.")] == ["report_link.made", "report_link.opened"]
     assert stored["openings"] == 1
     # expired, revoked, of a reopened report, never there: one answer
     with clinic.db.write() as c:
@@ -174,10 +174,10 @@ async def test_a_link_opens_one_report_without_account_or_code_until_it_ends(cli
         await client.post(f"/api/v1/signed-reports/{report}/reopen", json={"reason": "Typing error"})
         reopened = await stranger.get(third["url"])
         unknown = await stranger.get("/r/" + "x" * 43)
-        after = await client.post(f"/api/v1/signed-reports/{report}/links", json={})
+        final_response = await client.post(f"/api/v1/signed-reports/{report}/links", json={})
     assert {a.status_code for a in (expired, revoked, reopened, unknown)} == {404}
     assert {a.json()["code"] for a in (expired, revoked, reopened, unknown)} == {"link_not_valid"}
-    assert after.json()["code"] == "not_in_force"
+    assert final_response.json()["code"] == "not_in_force"
     # failures are throttled, and nobody with a valid link at the same address notices
     async with clinic.client() as stranger, clinic.client("clinician") as client:
         fourth = (
@@ -274,10 +274,10 @@ async def test_the_leaflet_tells_the_person_in_plain_words_what_became_of_the_la
     clinic: Clinic,
 ) -> None:
     patient, first = await visit(clinic, "S-5")
-    alone = await page(clinic, f"/sessions/{first}/leaflet", "viewer")
-    assert "12.0 metres in ten seconds" in alone
-    assert alone.count("There is no earlier value to compare with.") == 3
-    assert "estimate" not in alone
+    single = await page(clinic, f"/sessions/{first}/leaflet", "viewer")
+    assert "12.0 metres in ten seconds" in single
+    assert single.count("There is no earlier value to compare with.") == 3
+    assert "estimate" not in single
     later = {"title": "Walk", "performed_on": "2100-01-02"}
     async with clinic.client("clinician") as client:
         session = (await client.post(f"/api/v1/patients/{patient}/sessions", json=later)).json()["id"]
@@ -301,9 +301,9 @@ async def test_the_leaflet_tells_the_person_in_plain_words_what_became_of_the_la
 def slower() -> dict[str, bytes]:
     """The same walk at half its speed."""
     files = dict(analysed.files())
-    found = json.loads(files["analysis.json"])
-    for row in found["parameters"]:
+    data = json.loads(files["analysis.json"])
+    for row in data["parameters"]:
         if row["name"] == "gait_speed_mps":
             row["mean"] /= 2.0
-    files["analysis.json"] = json.dumps(found).encode()
+    files["analysis.json"] = json.dumps(data).encode()
     return files

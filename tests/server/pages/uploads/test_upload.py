@@ -1,4 +1,4 @@
-"""Which segment the upload page preselects, and what it rests on."""
+"""Preselected segments on the upload page and their sources."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ RIGHT_WAY = {"P": "pelvis", "A": "foot_r", "B": "foot_l", "C": "shank_r"}
 
 
 def recording(devices: list[dict[str, Any]], manifest: Mapping[str, Any] | None = None) -> StoredRecording:
-    found = {"devices": devices, "duration_s": 25.0, "protocol": "walk", "notices": []}
-    return StoredRecording("r", "s", "p", "ready", (), manifest, found, None)
+    result = {"devices": devices, "duration_s": 25.0, "protocol": "walk", "notices": []}
+    return StoredRecording("r", "s", "p", "ready", (), manifest, result, None)
 
 
 def chosen(view: Mapping[str, Any]) -> dict[str, str | None]:
@@ -163,13 +163,13 @@ def test_files_that_were_not_used_are_one_list_beside_the_notices() -> None:
     def about(code: str, name: str, severity: str) -> dict[str, Any]:
         return {"code": code, "message": f"{name} …", "sensor": None, "t_s": None, "severity": severity}
 
-    found = recording(WALKER)
-    assert found.inspection is not None
+    result = recording(WALKER)
+    assert result.inspection is not None
     notices = [
         about("ignored_file", "README.md", "info"),
         about("file_not_read", "angles.csv", "warning"),
         about("gap", "pelvis", "warning"),
     ]
-    view = view_inspection(replace(found, inspection={**found.inspection, "notices": notices}), {})
+    view = view_inspection(replace(result, inspection={**result.inspection, "notices": notices}), {})
     assert view["unused"] == ["README.md …", "angles.csv …"]
     assert [n["message"] for n in view["notices"]] == ["pelvis …"]

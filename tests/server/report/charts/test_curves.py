@@ -21,8 +21,8 @@ MakeBundle = Callable[..., Bundle]
 def knee(bundle: Bundle) -> ET.Element:
     assert bundle.angles is not None
     entered = replace(bundle.angles, standing_deg={"knee_flexion_l": 0.0, "knee_flexion_r": 0.0})
-    shown = report_model(replace(bundle, angles=entered)).key_curve
-    root: ET.Element = fromstring(cycle_svg(shown, x_unit=True))
+    visible_key_curve = report_model(replace(bundle, angles=entered)).key_curve
+    root: ET.Element = fromstring(cycle_svg(visible_key_curve, x_unit=True))
     return root
 
 
@@ -58,8 +58,8 @@ def test_layers_lie_in_the_order_of_the_chart_rules(knee: ET.Element) -> None:
 
 def test_each_counted_stride_is_a_thin_line_with_its_number(bundle: Bundle, knee: ET.Element) -> None:
     drawn = {int(e.get("data-stride") or -1) for css in ("sl", "sr") for e in all_of(knee, css)}
-    counted = {i for i, s in enumerate(bundle.strides.strides) if s.excluded_reason is None}
-    assert drawn == counted
+    counted_strides = {i for i, s in enumerate(bundle.strides.strides) if s.excluded_reason is None}
+    assert drawn == counted_strides
 
 
 def test_long_takes_draw_a_spread_of_strides(make_bundle: MakeBundle) -> None:
@@ -68,8 +68,10 @@ def test_long_takes_draw_a_spread_of_strides(make_bundle: MakeBundle) -> None:
     root = fromstring(cycle_svg(model.key_curve))
     left = [int(e.get("data-stride") or 0) for e in all_of(root, "sl")]
     assert len(left) == DRAWN_STRIDES
-    counted = [i for i, s in enumerate(long.strides.strides) if s.side == "left" and not s.excluded_reason]
-    assert (left[0], left[-1]) == (counted[0], counted[-1])
+    counted_strides = [
+        i for i, s in enumerate(long.strides.strides) if s.side == "left" and not s.excluded_reason
+    ]
+    assert (left[0], left[-1]) == (counted_strides[0], counted_strides[-1])
     assert any("Thin lines show 40" in note for note in model.curve_notes)
 
 
@@ -90,12 +92,12 @@ def test_the_mean_passes_through_its_values(bundle: Bundle, knee: ET.Element) ->
     x, y = follow_path(all_of(knee, "ml")[0].get("d") or "")
     low, high = panel.variable.y_range
     assert x == [10 * i for i in range(101)]
-    for at, angle in zip(y, mean, strict=True):
-        assert high - at / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
+    for position, angle in zip(y, mean, strict=True):
+        assert high - position / 1000 * (high - low) == pytest.approx(angle, abs=0.06)
 
 
 def follow_path(d: str) -> tuple[list[int], list[int]]:
-    """Places of a path that begins with M and goes on with relative steps."""
+    """Points of a path that starts with M and continues with relative steps."""
     start, steps = d.removeprefix("M").split("l")
     moves = [re.fullmatch(r"(\d+)([+-]\d+)", step) for step in steps.split()]
     dx, dy = zip(*((int(m[1]), int(m[2])) for m in moves if m), strict=True)

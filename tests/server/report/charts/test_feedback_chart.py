@@ -25,8 +25,8 @@ def take(cues: list[Cue], values: list[float]) -> FeedbackSplit:
 
 
 def draw(cues: list[Cue], values: list[float] | None = None) -> ET.Element:
-    found = take(cues, [0.6] * len(cues) if values is None else values)
-    root: ET.Element = fromstring(feedback_svg(found, prescription(), parameter_term(NAME)))
+    trial = take(cues, [0.6] * len(cues) if values is None else values)
+    root: ET.Element = fromstring(feedback_svg(trial, prescription(), parameter_term(NAME)))
     return root
 
 
@@ -45,7 +45,7 @@ def test_strides_stand_in_their_order_filled_with_feedback_and_open_without() ->
 
 def test_blocks_without_feedback_are_columns_with_their_word() -> None:
     kinds: tuple[WhyNot | None, ...] = ("baseline", "baseline", None, "probe")
-    root = draw([cue(n, why) for n, why in enumerate(kinds)])
+    root = draw([cue(n, reason) for n, reason in enumerate(kinds)])
     assert [(e.get("x"), e.get("width")) for e in of_class(root, "fb-block")] == [
         ("0", "500"), ("750", "250")
     ]  # fmt: skip
@@ -75,6 +75,6 @@ def test_the_mean_of_the_target_is_a_line_where_it_lies_on_the_axis() -> None:
 
 def test_a_value_far_off_lies_on_the_edge_and_does_not_press_the_zone_together() -> None:
     # six widths of 0.05 above the zone's end at 0.7 make 1.0 the highest value that is drawn
-    at = [float(e.get("y") or 0) for e in draw([cue(1), cue(2)], [0.6, 9.0]).iter("svg") if e.get("x")]
+    position = [float(e.get("y") or 0) for e in draw([cue(1), cue(2)], [0.6, 9.0]).iter("svg") if e.get("x")]
     low, high = 0.5 - 0.06 * 0.5, 1.0 + 0.06 * 0.5
-    assert at == pytest.approx([144.0 * (high - 0.6) / (high - low), 0.0], abs=0.1)
+    assert position == pytest.approx([144.0 * (high - 0.6) / (high - low), 0.0], abs=0.1)

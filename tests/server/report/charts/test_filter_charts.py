@@ -76,8 +76,8 @@ def test_bias_and_limits_are_lines_with_their_numbers() -> None:
         ("100%", "bias 0.2°"), ("100%", "−1.96 SD −1.5°"), ("100%", "+1.96 SD 1.9°"), ("0", "Filter more ↑")
     ]  # fmt: skip
     levels = [(e.get("class"), float(e.get("y1") or 0)) for e in root.iter("line")]
-    found = {css: y for css, y in levels if css == "bal"}
-    assert found["bal"] == pytest.approx(1000 * (1.9 + 0.08 * 3.4 - 0.2) / (1.16 * 3.4), abs=0.1)
+    by_css = {css: y for css, y in levels if css == "bal"}
+    assert by_css["bal"] == pytest.approx(1000 * (1.9 + 0.08 * 3.4 - 0.2) / (1.16 * 3.4), abs=0.1)
     assert sum(css == "mdcl" for css, _ in levels) == 2
 
 

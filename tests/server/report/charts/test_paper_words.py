@@ -1,4 +1,4 @@
-"""Words of a chart on paper stand clear of its curves."""
+"""Labels of printed charts do not overlap the curves."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the monitor found comes back from its files as it was, and goes through the whole analysis."""
+"""Monitor results survive their files unchanged, and pass through the whole analysis."""
 
 from __future__ import annotations
 
@@ -29,21 +29,21 @@ def recording() -> Recording:
 def files(recording: Recording) -> dict[str, bytes]:
     stages: list[str] = []
     source = SourceFile.of_bytes("day.parquet", write_recording(recording))
-    found = analysing.run([source], None, None, lambda stage, share: stages.append(stage))
+    result = analysing.run([source], None, None, lambda stage, share: stages.append(stage))
     assert stages == ["reading", "activity", "quality", "done"]
-    return found
+    return result
 
 
 def test_everything_comes_back(recording: Recording) -> None:
-    found = analyse(recording).activity
-    assert found is not None
-    again = read_activity(write_activity(found))
-    for name in vars(found):
+    activity = analyse(recording).activity
+    assert activity is not None
+    second_activity = read_activity(write_activity(activity))
+    for name in vars(activity):
         if name in ("steps_s", "inclination_deg", "turns"):
             continue
-        assert getattr(again, name) == getattr(found, name), name
-    assert again.steps_s.tobytes() == found.steps_s.tobytes()
-    assert np.allclose(again.inclination_deg, found.inclination_deg, atol=1e-4, equal_nan=True)
+        assert getattr(second_activity, name) == getattr(activity, name), name
+    assert second_activity.steps_s.tobytes() == activity.steps_s.tobytes()
+    assert np.allclose(second_activity.inclination_deg, activity.inclination_deg, atol=1e-4, equal_nan=True)
 
 
 def test_the_job_writes_what_pages_and_downloads_read(files: dict[str, bytes]) -> None:

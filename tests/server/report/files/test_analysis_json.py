@@ -1,4 +1,4 @@
-"""What analysis.json says of an analysis."""
+"""Content of analysis.json."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def test_it_is_plain_json_without_numbers_that_are_none(said: dict[str, Any]) ->
 
 
 def test_an_analysis_that_stopped_early_says_what_it_reached() -> None:
-    found = summarise_analysis(analysed.analysis(reached=False))
+    analysis = summarise_analysis(analysed.analysis(reached=False))
     for name in ("calibration", "calibration_score", "estimator", "walking", "functional", "body"):
-        assert found[name] is None, name
-    assert (found["scores"], found["mean_curves"], found["parameters"]) == ([], {}, [])
-    assert found["warnings"] != []
+        assert analysis[name] is None, name
+    assert (analysis["scores"], analysis["mean_curves"], analysis["parameters"]) == ([], {}, [])
+    assert analysis["warnings"] != []
 
 
 def test_angles_of_the_calibration_are_in_degrees_and_what_is_not_known_is_null(said: dict[str, Any]) -> None:
@@ -86,11 +86,11 @@ def test_the_level_is_the_worse_of_signals_and_estimator(
     assert finished.posed is not None
     assert finished.posed.poses is not None
     poses = replace(finished.posed.poses, health=(HealthFinding(name, None, value, 0.5, 2.0),))
-    judged = replace(finished, posed=replace(finished.posed, poses=poses), angles=None, measured=None)
-    found: dict[str, Any] = summarise_analysis(judged)
-    quality = found["quality"]
+    variant = replace(finished, posed=replace(finished.posed, poses=poses), angles=None, measured=None)
+    fields: dict[str, Any] = summarise_analysis(variant)
+    quality = fields["quality"]
     assert (quality["level"], quality["signals_level"], quality["reasons"]) == (level, "good", reasons)
-    assert found["estimator"]["health"][0]["value"] == value
+    assert fields["estimator"]["health"][0]["value"] == value
 
 
 def test_a_parameter_without_a_finite_number_is_null() -> None:

@@ -1,4 +1,4 @@
-"""What is written is what is read: the files of an analysis and back."""
+"""Analysis files are read back unchanged."""
 
 from __future__ import annotations
 

@@ -59,14 +59,14 @@ def test_a_short_file_is_what_a_table_at_once_gives(rows: int) -> None:
 def test_numbers_of_a_table_are_rounded_as_each_alone(values: list[float | None], halves: list[int]) -> None:
     column = [*values, *(1e-7 * half for half in halves)]
     cells = ["" if x is None or not math.isfinite(x) else repr(round(x, 6) + 0.0) for x in column]
-    said = write_csv(("a", "b"), ((x, "word") for x in column)).decode()
-    assert said.splitlines() == ["a,b", *(f"{cell},word" for cell in cells)]
+    text = write_csv(("a", "b"), ((x, "word") for x in column)).decode()
+    assert text.splitlines() == ["a,b", *(f"{cell},word" for cell in cells)]
 
 
 def test_words_numbers_and_formulas_may_stand_in_one_column() -> None:
     cells = ["=1+1", 1, True, np.float32(0.5), None, "a,b", np.int64(3)]
-    said = write_csv(("a", "b"), [(x, x if isinstance(x, str) else None) for x in cells]).decode()
-    assert said.splitlines()[1:] == [
+    text = write_csv(("a", "b"), [(x, x if isinstance(x, str) else None) for x in cells]).decode()
+    assert text.splitlines()[1:] == [
         "'=1+1,'=1+1", "1,", "True,", "0.5,", ",", '"a,b","a,b"', "3,"
     ]  # fmt: skip
 

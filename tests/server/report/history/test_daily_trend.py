@@ -1,4 +1,4 @@
-"""Capacity in the clinic beside performance at home."""
+"""Capacity in the clinic compared with performance at home."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def bout(start_s: float, duration_s: float, cadence: float, kind: str = "walking
 
 
 def home(*bouts: ActivityBout, worn_h: float = 12.0, date: dt.date | None = None) -> ActivityResult:
-    """Two days, the second of which was not worn."""
+    """Two days, the second not worn."""
     first = ActivityDay(date, 0.0, 86400.0, worn_h, 4000, {}, {}, len(bouts), None)
     days = (first, replace(first, start_s=86400.0, end_s=172800.0, worn_h=0.0))
     return ActivityResult(
@@ -61,7 +61,7 @@ def home(*bouts: ActivityBout, worn_h: float = 12.0, date: dt.date | None = None
 
 
 def test_the_cadence_of_a_day_is_the_median_of_its_long_walks() -> None:
-    found = home(
+    result = home(
         bout(0.0, LONG_BOUT_S, 90.0),
         bout(1000.0, 90.0, 100.0),
         bout(2000.0, 90.0, 130.0),
@@ -69,7 +69,7 @@ def test_the_cadence_of_a_day_is_the_median_of_its_long_walks() -> None:
         bout(4000.0, 90.0, 10.0, "stairs_up"),
         bout(86400.0, 90.0, 10.0),
     )
-    assert read_performance("s1", DAY, found) == [PerformanceDay("s1", DAY, 4000, 12.0, 100.0)]
+    assert read_performance("s1", DAY, result) == [PerformanceDay("s1", DAY, 4000, 12.0, 100.0)]
 
 
 def test_a_day_has_the_date_of_the_device_or_is_counted_from_the_session() -> None:

@@ -11,16 +11,16 @@ def knee(degrees: float, *, estimated: bool = False) -> Parameter:
     return Parameter("knee_flexion_rom_deg", "left", 40, degrees, 1.0, "deg", estimated=estimated)
 
 
-def tell(before: Parameter | None, after: Parameter) -> LeafletFigure:
-    changes = () if before is None else parameter_changes([before], [after], "left")
-    (found,) = list_figures([after, Parameter("step_length_m", "left", 0, None, None, "m")], changes, "left")
-    return found
+def tell(earlier: Parameter | None, later: Parameter) -> LeafletFigure:
+    changes = () if earlier is None else parameter_changes([earlier], [later], "left")
+    (result,) = list_figures([later, Parameter("step_length_m", "left", 0, None, None, "m")], changes, "left")
+    return result
 
 
 def test_what_was_measured_in_another_way_is_not_set_beside_it() -> None:
-    told = tell(knee(40.0), knee(60.0, estimated=True))
-    assert (told.now, told.before, told.estimated) == ("60 degrees", None, True)
-    assert "in another way" in told.words
+    notices = tell(knee(40.0), knee(60.0, estimated=True))
+    assert (notices.now, notices.before, notices.estimated) == ("60 degrees", None, True)
+    assert "in another way" in notices.words
     assert tell(None, knee(60.0)).words == "There is no earlier value to compare with."
 
 

@@ -14,17 +14,17 @@ from tests.server import analysed
 
 def test_kept_means_are_those_of_the_angles() -> None:
     files = analysed.files()
-    kept, found = read_means(files["analysis.json"]), means_of(load_bundle(files))
-    assert kept is not None
-    assert kept.parameters == found.parameters
-    assert {side: set(own) for side, own in kept.curves.items()} == {
-        side: set(own) for side, own in found.curves.items()
+    stored_means, means = read_means(files["analysis.json"]), means_of(load_bundle(files))
+    assert stored_means is not None
+    assert stored_means.parameters == means.parameters
+    assert {side: set(own) for side, own in stored_means.curves.items()} == {
+        side: set(own) for side, own in means.curves.items()
     }
-    assert len(found.curves["left"]) > 5
-    for side, own in found.curves.items():
+    assert len(means.curves["left"]) > 5
+    for side, own in means.curves.items():
         for variable, curve in own.items():
             # angles.parquet has single precision
-            np.testing.assert_allclose(kept.curves[side][variable], curve, atol=3e-5)
+            np.testing.assert_allclose(stored_means.curves[side][variable], curve, atol=3e-5)
 
 
 def test_without_a_standing_there_is_no_level_and_an_earlier_version_kept_none() -> None:
@@ -40,6 +40,6 @@ def test_without_a_standing_there_is_no_level_and_an_earlier_version_kept_none()
 def test_a_curve_with_a_gap_keeps_it() -> None:
     data = json.loads(analysed.files()["analysis.json"])
     data["mean_curves"]["left"]["knee_flexion"][3] = None
-    kept = read_means(json.dumps(data).encode())
-    assert kept is not None
-    assert np.flatnonzero(np.isnan(kept.curves["left"]["knee_flexion"])).tolist() == [3]
+    stored_means = read_means(json.dumps(data).encode())
+    assert stored_means is not None
+    assert np.flatnonzero(np.isnan(stored_means.curves["left"]["knee_flexion"])).tolist() == [3]

@@ -32,11 +32,11 @@ def test_takes_are_rings_with_their_spread_and_the_mean_is_a_bar() -> None:
     takes = [figure(0.0), figure(None), figure(2.0, 0.5)]
     svg = fromstring(takes_svg(takes, figure(1.0), (0.0, 2.0), 'speed "a" < b'))
     assert svg.get("aria-label") == 'speed "a" < b'
-    found = [(e.get("class"), e.get("cx") or (e.get("x1"), e.get("x2"))) for e in svg]
+    result = [(e.get("class"), e.get("cx") or (e.get("x1"), e.get("x2"))) for e in svg]
     inside = WIDTH - 2 * ROOM
     ends = (f"{ROOM + 0.75 * inside:g}", f"{ROOM + 1.25 * inside:g}")
     middle = f"{ROOM + 0.5 * inside:g}"
-    assert found == [
+    assert result == [
         ("zero", (f"{ROOM}", f"{WIDTH - ROOM}")),
         ("tk", f"{ROOM}"),
         ("tk-sd", ends),

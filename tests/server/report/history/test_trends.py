@@ -1,4 +1,4 @@
-"""Trends judge assessments against the first one; trainings are shown and judged by nobody."""
+"""Trends compare assessments with the first one; trainings are shown without a verdict."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ def visit(
 
 
 def one(*visits: AnalysedVisit, name: str = "gait_speed_mps") -> Trend:
-    (found,) = follow_figures(visits, [name])
-    return found
+    (result,) = follow_figures(visits, [name])
+    return result
 
 
 @pytest.mark.parametrize(
@@ -126,10 +126,10 @@ def test_an_estimated_angle_is_on_no_line_with_measured_ones() -> None:
     assert line.change is not None
     assert line.change.difference == pytest.approx(-9.2)
     for k in (0, 2):
-        told = line.points[k].change
-        assert told is not None
-        assert (told.difference, told.reason) == (None, "not_measured_alike")
-        assert change_words(told).verdict == "not compared: one is measured, the other estimated"
+        notices = line.points[k].change
+        assert notices is not None
+        assert (notices.difference, notices.reason) == (None, "not_measured_alike")
+        assert change_words(notices).verdict == "not compared: one is measured, the other estimated"
     drawn = trend_svg(trend, line, visits)
     assert drawn.count('class="pl-l est"') == 2
     assert drawn.count('class="tr-l"') == 1
@@ -159,9 +159,9 @@ def test_numbers_of_a_file_say_which_angles_are_estimated(stored: str) -> None:
         "scores": [],
         "warnings": [],
     }
-    found = read_numbers(json.dumps(data).encode())
-    assert found is not None
-    assert [p.estimated for p in found.parameters] == [True, False]
+    numbers = read_numbers(json.dumps(data).encode())
+    assert numbers is not None
+    assert [p.estimated for p in numbers.parameters] == [True, False]
 
 
 def test_few_strides_widen_the_band_to_what_they_leave_open() -> None:

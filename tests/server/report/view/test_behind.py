@@ -1,4 +1,4 @@
-"""What a number opens to."""
+"""Details of a parameter."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def test_a_number_is_the_mean_of_the_strides_it_opens_to(make_bundle: MakeBundle
     rows = {r.name: r for _, group in report_model(bundle).groups for r in group}
     column = tuple(s.end_s - s.start_s for s in bundle.strides.strides)
     number = open_row(rows["stride_time_s"], bundle.strides, column, 12.0)
-    counted = [s.value for s in number.strides if s.counted and s.side == "left" and s.value is not None]
+    values = [s.value for s in number.strides if s.counted and s.side == "left" and s.value is not None]
     assert rows["stride_time_s"].left is not None
-    assert sum(counted) / len(counted) == pytest.approx(rows["stride_time_s"].left.value)
-    assert rows["stride_time_s"].left.n == len(counted)
+    assert sum(values) / len(values) == pytest.approx(rows["stride_time_s"].left.value)
+    assert rows["stride_time_s"].left.n == len(values)
     left_out = [s for s in number.strides if not s.counted]
     assert left_out
     assert all(s.excluded for s in left_out)
@@ -78,8 +78,8 @@ def test_an_anatomical_angle_opens_to_its_strides_shifted_by_the_goniometer(make
     strides = make_bundle().strides
     column = tuple(float(i) for i in range(len(strides.strides)))
     columns = {"knee_flexion_ic_deg": column}
-    found = level_column("knee_flexion_ic_anatomical_deg", strides, columns, {"knee_flexion_l": 8.0})
-    assert found is not None
-    for s, was, now in zip(strides.strides, column, found, strict=True):
+    result = level_column("knee_flexion_ic_anatomical_deg", strides, columns, {"knee_flexion_l": 8.0})
+    assert result is not None
+    for s, was, now in zip(strides.strides, column, result, strict=True):
         assert now == (was + 8.0 if s.side == "left" else None)
     assert level_column("cadence_spm", strides, columns, {}) is None

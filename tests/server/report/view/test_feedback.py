@@ -13,8 +13,10 @@ from tests.helpers.feedback import prescription
 
 
 def cue(n: int, why_not: WhyNot | None = None, value: float = 0.62, block: int | None = None) -> Cue:
-    shown = why_not is None
-    return Cue(n, "left", float(n), n + 1.0, value, 0.0, "in", shown, why_not, 1, 0.5, 0.7, None, block)
+    visible_rows = why_not is None
+    return Cue(
+        n, "left", float(n), n + 1.0, value, 0.0, "in", visible_rows, why_not, 1, 0.5, 0.7, None, block
+    )
 
 
 def take(cues: list[Cue], values: list[float]) -> FeedbackSplit:
@@ -22,8 +24,8 @@ def take(cues: list[Cue], values: list[float]) -> FeedbackSplit:
     return split(strides, cues)
 
 
-def view(found: FeedbackSplit) -> FeedbackView:
-    return feedback_view(prescription(), found, GuardState())
+def view(result: FeedbackSplit) -> FeedbackView:
+    return feedback_view(prescription(), result, GuardState())
 
 
 TRAINED = take(
@@ -42,9 +44,9 @@ def test_strides_with_and_without_feedback_are_apart_and_parts_follow_their_whol
 
 
 def test_a_take_without_a_stride_still_says_how_many_and_draws_nothing() -> None:
-    shown = view(split([], []))
-    assert [(r.kind, r.n, r.text) for r in shown.rows] == [("with", 0, "–"), ("without", 0, "–")]
-    assert shown.svg == ""
+    visible_view = view(split([], []))
+    assert [(r.kind, r.n, r.text) for r in visible_view.rows] == [("with", 0, "–"), ("without", 0, "–")]
+    assert visible_view.svg == ""
     assert view(TRAINED).svg.startswith("<div")
 
 
@@ -55,8 +57,8 @@ def test_a_probe_stands_beside_the_strides_right_before_it() -> None:
 
 
 def test_notes_say_how_far_the_live_values_were_off_and_what_was_left_out() -> None:
-    how, side_effects, live = view(take([cue(1), cue(2)], [0.60, 0.60])).notes
-    assert how.startswith("Values are those of the finished analysis")
+    mode, side_effects, live = view(take([cue(1), cue(2)], [0.60, 0.60])).notes
+    assert mode.startswith("Values are those of the finished analysis")
     assert side_effects == "Side effects: the last 20 strides vs the first 10 of the trial."
     assert live == f"What was fed back differed from the analysis by 0.020 ± 0.000{NBSP}m."
     few = split([AnalysedStride("left", 2.0, 0.6, False)], [cue(1), cue(2), cue(3)])
@@ -67,25 +69,25 @@ def test_notes_say_how_far_the_live_values_were_off_and_what_was_left_out() -> N
 
 
 def test_json_has_every_stride_with_the_value_of_the_analysis_and_the_live_one() -> None:
-    found = view(TRAINED).to_json()
-    strides = found["strides"]
+    result = view(TRAINED).to_json()
+    strides = result["strides"]
     assert isinstance(strides, list)
     assert [(s["n"], s["value"], s["live_value"], s["in_zone"]) for s in strides] == [
         (1, 0.60, 0.62, True), (2, 0.62, 0.62, True), (3, 0.80, 0.62, False), (4, 0.64, 0.62, True)
     ]  # fmt: skip
-    assert (found["parameter"], found["unit"], found["side"]) == ("step_length_m", "m", "left")
-    assert found["levels"] == [{"n": 1, "t_s": 1.0, "level": 1}]
-    assert found["retention"] is None
-    words = found["words"]
+    assert (result["parameter"], result["unit"], result["side"]) == ("step_length_m", "m", "left")
+    assert result["levels"] == [{"n": 1, "t_s": 1.0, "level": 1}]
+    assert result["retention"] is None
+    words = result["words"]
     assert isinstance(words, list)
     assert words[0] == "Trained: Step length, left"
 
 
 def test_without_an_earlier_training_there_is_no_retention_to_tell() -> None:
-    shown = view(TRAINED)
-    assert (shown.retention, shown.retention_words) == (None, "")
-    assert shown.title == "Step length, left"
-    assert shown.target == f"0.60 ± 0.05{NBSP}m, entered"
+    visible_view = view(TRAINED)
+    assert (visible_view.retention, visible_view.retention_words) == (None, "")
+    assert visible_view.title == "Step length, left"
+    assert visible_view.target == f"0.60 ± 0.05{NBSP}m, entered"
 
 
 def test_the_stride_list_takes_the_value_of_the_trained_parameter_and_whether_it_counts() -> None:

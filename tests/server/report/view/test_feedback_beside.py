@@ -1,4 +1,4 @@
-"""What changed beside the target, and what was left of the last training."""
+"""Other parameters that changed during training, and retention since the last one."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def strides(side: Side, values: Sequence[float | None], counted: bool = True) ->
 
 
 def test_the_other_side_is_held_against_its_first_strides_in_order_of_time() -> None:
-    other = strides("right", [0.5] * FIRST + [0.7] * FIRST)
-    given = prescription(guard={"other_change": 0.1})
-    state = side_effects(given, OPEN, other[::-1], None)
+    second = strides("right", [0.5] * FIRST + [0.7] * FIRST)
+    inputs = prescription(guard={"other_change": 0.1})
+    state = side_effects(inputs, OPEN, second[::-1], None)
     assert state.other.change == pytest.approx(0.2)
     assert state.other.beyond
-    assert not side_effects(prescription(guard={"other_change": 0.3}), OPEN, other, None).other.beyond
+    assert not side_effects(prescription(guard={"other_change": 0.3}), OPEN, second, None).other.beyond
 
 
 def test_strides_that_do_not_count_or_were_not_measured_say_nothing() -> None:
@@ -82,9 +82,9 @@ def test_the_profile_is_judged_by_the_curves_of_the_strides_that_count() -> None
 def test_effects_in_words_say_the_change_and_the_limit_it_is_held_against() -> None:
     within = SideEffect(0.02, 0.10, "set in the prescription", False, None)
     beyond = SideEffect(2.04, 1.6, "MCID", True, None)
-    other, profile = describe_effects(prescription(), GuardState(within, beyond), METRES)
-    assert (other.kind, other.label) == ("ok", "Step length, right")
-    assert (other.text, other.words) == (
+    second, profile = describe_effects(prescription(), GuardState(within, beyond), METRES)
+    assert (second.kind, second.label) == ("ok", "Step length, right")
+    assert (second.text, second.words) == (
         f"+0.02{NBSP}m", f"within 0.10{NBSP}m (set in the prescription)"
     )  # fmt: skip
     assert (profile.kind, profile.text, profile.words) == ("warn", "+2.0°", "more than 1.6° (MCID)")
@@ -115,42 +115,42 @@ def retained(now: float | None, end: float | None, name: str = NAME) -> Retentio
 
         return FeedbackSplit((), {"retention": summary(start)}, (), (), summary(last), 0, 0, Summary())
 
-    before = PreviousTraining("s1", DAY, result(None, end))
+    initial = PreviousTraining("s1", DAY, result(None, end))
     return compare_retention(
-        prescription(parameter=name), result(now, None), before, parameter_term(name), None
+        prescription(parameter=name), result(now, None), initial, parameter_term(name), None
     )
 
 
 def test_retention_is_the_first_strides_of_today_less_the_last_of_the_training_before() -> None:
-    found = retained(0.54, 0.60)
-    assert found is not None
-    assert found.difference == pytest.approx(-0.06)
-    assert (found.session_id, found.performed_on) == ("s1", DAY)
-    assert (found.end.text, found.now.text) == ("0.60 ± 0.02", "0.54 ± 0.02")
-    assert (found.end.label, found.now.kind) == ("End of the last training", "retention")
+    result = retained(0.54, 0.60)
+    assert result is not None
+    assert result.difference == pytest.approx(-0.06)
+    assert (result.session_id, result.performed_on) == ("s1", DAY)
+    assert (result.end.text, result.now.text) == ("0.60 ± 0.02", "0.54 ± 0.02")
+    assert (result.end.label, result.now.kind) == ("End of the last training", "retention")
 
 
 @pytest.mark.parametrize("now", [0.54, 0.66])
 def test_a_difference_below_the_measurement_error_is_within_it(now: float) -> None:
-    found = retained(now, 0.60)
-    assert found is not None
-    assert found.verdict == f"within the measurement error of 0.067{NBSP}m"
-    assert found.limit == 0.067
-    assert found.limit_source is not None
+    result = retained(now, 0.60)
+    assert result is not None
+    assert result.verdict == f"within the measurement error of 0.067{NBSP}m"
+    assert result.limit == 0.067
+    assert result.limit_source is not None
 
 
 @pytest.mark.parametrize("now", [0.53, 0.67])
 def test_a_difference_either_way_can_be_more_than_the_measurement_error(now: float) -> None:
-    found = retained(now, 0.60)
-    assert found is not None
-    assert found.verdict == f"more than the measurement error of 0.067{NBSP}m"
+    result = retained(now, 0.60)
+    assert result is not None
+    assert result.verdict == f"more than the measurement error of 0.067{NBSP}m"
 
 
 def test_a_parameter_without_a_known_error_says_so() -> None:
-    found = retained(1.2, 1.1, "stride_time_s")
-    assert found is not None
-    assert (found.limit, found.limit_source) == (None, None)
-    assert found.verdict == "the measurement error of this parameter is unknown"
+    result = retained(1.2, 1.1, "stride_time_s")
+    assert result is not None
+    assert (result.limit, result.limit_source) == (None, None)
+    assert result.verdict == "the measurement error of this parameter is unknown"
 
 
 def test_retention_needs_both_ends() -> None:

@@ -25,8 +25,8 @@ def test_the_headline_says_what_the_choice_of_a_filter_changes() -> None:
         == "2 filters on 1 sensor: their knee flexion differs by 0.5° left (standard deviation)."
     )
     assert view.sentences[0] == "Magnetometer: not used. Over the gait cycle: 4 left and 0 right strides."
-    alone = replace(analysed.comparison(), filters=analysed.comparison().filters[:2])
-    view = view_comparison(filter_run_files(alone)["filters.json"], "cycle")
+    single_variant = replace(analysed.comparison(), filters=analysed.comparison().filters[:2])
+    view = view_comparison(filter_run_files(single_variant)["filters.json"], "cycle")
     assert "has no other to differ from" in view.headline
     assert (view.table, [panels for _, panels in view.groups if panels]) == ((), [])
     assert {row.to_median for row in view.rows} == {("", "")}
@@ -78,9 +78,9 @@ def test_curves_over_time_are_bounded_and_keep_what_is_unknown() -> None:
     assert len(bin_values(np.arange(30_001.0), np.nanmean)) <= BINS
     values = np.full(2 * BINS, np.nan)
     values[:3] = (1.0, 3.0, 5.0)
-    found = bin_values(values, np.nanmax)
-    assert found[:2].tolist() == [3.0, 5.0]
-    assert np.isnan(found[2:]).all()
+    result = bin_values(values, np.nanmax)
+    assert result[:2].tolist() == [3.0, 5.0]
+    assert np.isnan(result[2:]).all()
 
 
 def test_every_filter_is_in_one_engine_and_the_proposal_needs_no_magnetometer() -> None:

@@ -1,4 +1,4 @@
-"""What the headline says, and of whom it is silent."""
+"""Headline sentences, and cases without a statement."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def test_only_figures_of_the_catalogue_speak() -> None:
 
 def test_a_side_that_differs_is_named_with_the_difference() -> None:
     norms = norm("knee_flexion_max_swing_deg", 60.0, 5.0, apart=3.0)
-    told = said(norms, *both_sides("knee_flexion_max_swing_deg", 42.0, 60.0))
-    assert told == ["Knee flexion in swing is 18° less on the left (42° vs 60°, norm 60 ± 5°)"]
+    message = said(norms, *both_sides("knee_flexion_max_swing_deg", 42.0, 60.0))
+    assert message == ["Knee flexion in swing is 18° less on the left (42° vs 60°, norm 60 ± 5°)"]
 
 
 @pytest.mark.parametrize(
@@ -74,17 +74,17 @@ def test_a_side_that_differs_is_named_with_the_difference() -> None:
 def test_the_difference_is_that_of_the_values_as_they_are_printed(
     name: str, left: float, right: float
 ) -> None:
-    """The headline said 13.5 points where the row below it said 59.9, 73.5 and "shorter by 13.6"."""
+    """The headline's difference is consistent with the printed values (59.9, 73.5, "shorter by 13.6")."""
     norms = Norms(None, None)
     parameters = both_sides(name, left, right, sd=0.001)
     (row,) = parameter_rows(parameters, norms)
-    by = re.search(r"by ([\d.]+)", row.difference or "")
-    (told,) = said(norms, *parameters)
-    spoken = re.search(r"is ([\d.]+)\u202f(%|s|cm)", told)
-    assert by is not None
+    by_key = re.search(r"by ([\d.]+)", row.difference or "")
+    (message,) = said(norms, *parameters)
+    spoken = re.search(r"is ([\d.]+)\u202f(%|s|cm)", message)
+    assert by_key is not None
     assert spoken is not None
-    shown = float(by[1]) * (100.0 if spoken[2] == "cm" else 1.0)
-    assert float(spoken[1]) == pytest.approx(shown, abs=0.5 if spoken[2] == "cm" else 1e-9)
+    view = float(by_key[1]) * (100.0 if spoken[2] == "cm" else 1.0)
+    assert float(spoken[1]) == pytest.approx(view, abs=0.5 if spoken[2] == "cm" else 1e-9)
 
 
 def test_sides_within_what_healthy_sides_differ_by_are_not_told() -> None:
@@ -100,14 +100,14 @@ def test_sides_whose_strides_overlap_are_not_told() -> None:
 
 def test_both_sides_beyond_the_norm_are_one_sentence() -> None:
     norms = norm("knee_flexion_rom_deg", 62.0, 5.0, apart=3.8)
-    told = said(norms, *both_sides("knee_flexion_rom_deg", 40.0, 41.0))
-    assert told == ["Knee range of motion is reduced on both sides (left 40°, right 41°, norm 62 ± 5°)"]
+    message = said(norms, *both_sides("knee_flexion_rom_deg", 40.0, 41.0))
+    assert message == ["Knee range of motion is reduced on both sides (left 40°, right 41°, norm 62 ± 5°)"]
 
 
 def test_of_two_sides_that_differ_the_one_off_the_norm_is_spoken_of() -> None:
     norms = norm("hip_flexion_rom_deg", 37.0, 4.5, apart=2.6)
-    told = said(norms, *both_sides("hip_flexion_rom_deg", 52.0, 36.0))
-    assert told == ["Hip range of motion is 16° more on the left (52° vs 36°, norm 37 ± 4°)"]
+    message = said(norms, *both_sides("hip_flexion_rom_deg", 52.0, 36.0))
+    assert message == ["Hip range of motion is 16° more on the left (52° vs 36°, norm 37 ± 4°)"]
 
 
 @pytest.mark.parametrize("name", [n for n, p in PHRASES.items() if p.less])
@@ -142,10 +142,12 @@ def test_legs_within_their_norm_make_no_sentence_about_sides(name: str) -> None:
 
 def test_within_two_deviations_nothing_stands_out() -> None:
     norms = norm("gait_speed_mps", 1.25, 0.16)
-    found, looked_at = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.94),), norms), norms)
-    assert (found, looked_at) == ((), 1)
-    told = said(norms, measured("gait_speed_mps", None, 0.80))
-    assert told == ["Gait speed is below normal for age (0.80\u202fm/s, norm 1.25 ± 0.16\u202fm/s)"]
+    standouts, looked_at = find_standouts(
+        parameter_rows((measured("gait_speed_mps", None, 0.94),), norms), norms
+    )
+    assert (standouts, looked_at) == ((), 1)
+    message = said(norms, measured("gait_speed_mps", None, 0.80))
+    assert message == ["Gait speed is below normal for age (0.80\u202fm/s, norm 1.25 ± 0.16\u202fm/s)"]
 
 
 def test_a_value_that_is_hardly_known_is_not_called_unusual() -> None:
@@ -161,11 +163,16 @@ def test_a_value_that_is_hardly_known_is_not_called_unusual() -> None:
 
 def test_the_caption_says_whom_the_sentences_compare_with() -> None:
     slow = norm("gait_speed_mps", 1.25, 0.16)
-    alone = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.80),), slow), slow)[0]
-    assert Headline("", alone).compared_with == "against people of this age"
+    single_standouts = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.80),), slow), slow)[
+        0
+    ]
+    assert Headline("", single_standouts).compared_with == "against people of this age"
     uneven = find_standouts(parameter_rows(both_sides("foot_pitch_ic_deg", 5.0, 20.0)), Norms(None, None))[0]
     assert Headline("", uneven).compared_with == "against the other side"
-    assert Headline("", (*alone, *uneven)).compared_with == "against people of this age and the other side"
+    assert (
+        Headline("", (*single_standouts, *uneven)).compared_with
+        == "against people of this age and the other side"
+    )
     assert Headline("").compared_with == ""
 
 
@@ -184,8 +191,8 @@ def test_a_sentence_is_about_the_row_whose_zero_is_that_of_the_curve() -> None:
     for anatomical, names in (({"hip_flexion"}, []), (set(), ["hip_flexion_min_deg"])):
         page = choose_zero(rows, anatomical)
         assert len(page) == 1
-        found, _ = find_standouts(page, Norms(None, None))
-        assert [s.name for s in found] == names
+        standouts, _ = find_standouts(page, Norms(None, None))
+        assert [s.name for s in standouts] == names
         assert all(row.difference != "no clear difference" for row in page if row.name in names)
 
 
@@ -217,13 +224,15 @@ def test_short_and_quick_steps_are_one_sentence() -> None:
         },
     )
     steps = both_sides("step_length_m", 0.28, 0.27, sd=0.01)
-    told = said(norms, *steps, measured("cadence_spm", None, 140.0))
-    assert told == ["Steps are short and quick (0.28\u202fm at 140\u202fsteps/min, norm 0.51 ± 0.05\u202fm)"]
+    message = said(norms, *steps, measured("cadence_spm", None, 140.0))
+    assert message == [
+        "Steps are short and quick (0.28\u202fm at 140\u202fsteps/min, norm 0.51 ± 0.05\u202fm)"
+    ]
 
 
-def change(name: str, side: Side | None, by: float, limit: float, verdict: Verdict | None) -> Change:
+def change(name: str, side: Side | None, key: float, limit: float, verdict: Verdict | None) -> Change:
     return Change(
-        name, side, "", 1.0, 1.0 + by, by, verdict, limit, "a table", None, None, None, None, None, None
+        name, side, "", 1.0, 1.0 + key, key, verdict, limit, "a table", None, None, None, None, None, None
     )
 
 
@@ -248,9 +257,9 @@ def test_a_clinically_relevant_change_is_told_before_a_larger_one() -> None:
         change("knee_flexion_max_swing_deg", "left", 11.7, 3.0, "real_change"),
         change("knee_flexion_rom_deg", "left", 11.7, 5.2, "clinically_relevant"),
     ])  # fmt: skip
-    told = find_changes(facts)
-    assert [s.name for s in told] == ["knee_flexion_rom_deg", "gait_speed_mps"]
-    headline = Headline("", changed=told, changes=facts)
+    changes = find_changes(facts)
+    assert [s.name for s in changes] == ["knee_flexion_rom_deg", "gait_speed_mps"]
+    headline = Headline("", changed=changes, changes=facts)
     assert [(c.title, c.side, c.size) for c in headline.changes_left] == [
         ("Knee flexion, swing peak, from standing", "left", "+11.7")
     ]
@@ -284,11 +293,11 @@ def test_at_most_six_sentences_and_the_rest_is_named() -> None:
         )
         for p in both_sides(name, left, right, sd=0.01)
     ]  # fmt: skip
-    found, _ = find_standouts(parameter_rows(parameters, norms), norms)
+    standouts, _ = find_standouts(parameter_rows(parameters, norms), norms)
     facts = sort_changes([change("gait_speed_mps", None, 0.22, 0.1, "real_change")])
-    headline = Headline("", found, find_changes(facts), changes=facts)
-    assert len(found) == 8
-    assert max(s.size for s in found) == LARGEST
+    headline = Headline("", standouts, find_changes(facts), changes=facts)
+    assert len(standouts) == 8
+    assert max(s.size for s in standouts) == LARGEST
     assert len(headline.shown) + len(headline.shown_changes) == MOST
     assert len(headline.standouts_left) == 3
     assert headline.changes_left == ()

@@ -35,14 +35,14 @@ def test_levels_are_placed_among_healthy_people() -> None:
         "knee_flexion_ic_anatomical_deg", "knee_flexion_max_loading_anatomical_deg",
         "knee_flexion_min_stance_anatomical_deg", "knee_flexion_max_swing_anatomical_deg",
     }  # fmt: skip
-    swing, before = (
+    swing, initial = (
         rows["knee_flexion_max_swing_anatomical_deg"],
         plain["knee_flexion_max_swing_anatomical_deg"],
     )
     assert swing.group == GROUP
     assert swing.left is not None
-    assert before.left is not None
-    assert swing.left.value == pytest.approx(before.left.value + 4.0)
+    assert initial.left is not None
+    assert swing.left.value == pytest.approx(initial.left.value + 4.0)
     assert swing.norm_source is not None
     assert swing.left.z is not None
     assert swing.left.z == pytest.approx((swing.left.value - 61.08) / 3.83, abs=0.01)
@@ -69,18 +69,22 @@ def test_the_report_shows_the_table_where_something_was_entered(bundle: Bundle) 
     entered = replace(bundle.angles, standing_deg={"knee_flexion_l": 4.0, "knee_flexion_r": 3.0})
     groups = dict(report_model(replace(bundle, angles=entered), age=40).groups)
     assert len(groups[GROUP]) == 4
-    before = {r.name: r for rows in groups.values() for r in rows}["knee_flexion_max_swing_deg"]
-    assert before.norm is None, "from standing it stays what it was"
+    initial = {r.name: r for rows in groups.values() for r in rows}["knee_flexion_max_swing_deg"]
+    assert initial.norm is None, "from standing it stays what it was"
 
 
 def test_a_level_shows_the_change_from_standing_and_says_so() -> None:
     standing = {"knee_flexion_l": 4.0, "knee_flexion_r": 4.0}
     groups = ((GROUP, level_rows(curves(), standing, norms(standing))),)
-    before = [Parameter("knee_flexion_max_swing_deg", s, 30, 40.0, 1.0, "deg") for s in SIDES]
-    now = [replace(p, mean=51.7) for p in before]
-    rows = {r.name: r for _, found in add_changes(groups, parameter_changes(before, now)) for r in found}
-    told = rows["knee_flexion_max_swing_anatomical_deg"].change
-    assert [(w.side, w.size, w.about) for w in told] == [
+    initial_parameters = [Parameter("knee_flexion_max_swing_deg", s, 30, 40.0, 1.0, "deg") for s in SIDES]
+    now = [replace(p, mean=51.7) for p in initial_parameters]
+    rows = {
+        r.name: r
+        for _, result in add_changes(groups, parameter_changes(initial_parameters, now))
+        for r in result
+    }
+    change = rows["knee_flexion_max_swing_anatomical_deg"].change
+    assert [(w.side, w.size, w.about) for w in change] == [
         ("left", "+11.7", "relative to standing"), ("right", "+11.7", "relative to standing")
     ]  # fmt: skip
     assert rows["knee_flexion_ic_anatomical_deg"].change == ()

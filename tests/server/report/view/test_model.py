@@ -56,11 +56,13 @@ def test_difference_is_said_in_words(name: str, left: float, right: float, words
 
 
 def test_words_agree_with_the_printed_numbers() -> None:
-    found = row(rows_of(of("step_time_s", "left", 0.6851), of("step_time_s", "right", 0.7049)), "step_time_s")
-    assert found.left is not None
-    assert found.right is not None
-    assert (found.left.text, found.right.text) == ("0.69", "0.70")
-    assert found.difference == "left shorter by 0.01\u202fs"
+    result = row(
+        rows_of(of("step_time_s", "left", 0.6851), of("step_time_s", "right", 0.7049)), "step_time_s"
+    )
+    assert result.left is not None
+    assert result.right is not None
+    assert (result.left.text, result.right.text) == ("0.69", "0.70")
+    assert result.difference == "left shorter by 0.01\u202fs"
 
 
 def test_what_the_strides_leave_open_is_no_difference() -> None:
@@ -105,17 +107,17 @@ def test_a_take_of_few_strides_shows_no_norm_anywhere(bundle: Bundle) -> None:
     assert bundle.angles is not None
     names = [f"{name}_{side}" for name in ("knee_flexion", "hip_flexion") for side in "lr"]
     entered = replace(bundle.angles, standing_deg=dict.fromkeys(names, 4.0))
-    kept: dict[str, int] = {"left": 0, "right": 0}
+    retained: dict[str, int] = {"left": 0, "right": 0}
     strides = []
     for s in bundle.strides.strides:
-        counts = s.excluded_reason is None and kept[s.side] < (3 if s.side == "left" else 2)
-        kept[s.side] += counts
+        counts = s.excluded_reason is None and retained[s.side] < (3 if s.side == "left" else 2)
+        retained[s.side] += counts
         strides.append(s if counts else replace(s, excluded_reason=s.excluded_reason or "turn"))
     few = replace(
         bundle,
         angles=entered,
         strides=Strides(tuple(strides)),
-        parameters=tuple(replace(p, n=min(p.n, kept[p.side or "left"])) for p in bundle.parameters),
+        parameters=tuple(replace(p, n=min(p.n, retained[p.side or "left"])) for p in bundle.parameters),
     )
     whole = report_model(replace(bundle, angles=entered), age=40, sex="male")
     model = report_model(few, age=40, sex="male")
@@ -126,38 +128,38 @@ def test_a_take_of_few_strides_shows_no_norm_anywhere(bundle: Bundle) -> None:
     assert not any("norm" in k.words for k in model.kpis)
     assert FEW_NOTE in model.norm_note
     rows = list(csv.DictReader(io.StringIO(parameters_csv(model).decode())))
-    counted = [r for r in rows if r["side"] and r["mean"]]
-    assert counted
-    assert {r["norm_mean"] for r in counted} == {""}
+    counted_strides = [r for r in rows if r["side"] and r["mean"]]
+    assert counted_strides
+    assert {r["norm_mean"] for r in counted_strides} == {""}
     curves = csv.DictReader(io.StringIO(curves_csv(model).decode()))
     assert {r["norm_mean_deg"] for r in curves} == {""}
 
 
 def test_a_large_number_says_what_each_side_is_known_to() -> None:
     left, right = both("knee_flexion_rom_deg", 70.0, 71.0, "deg")
-    (found,) = parameter_rows([replace(left, n=2, uncertainty=30.8), replace(right, n=1, sd=None)])
-    assert say_plus_minus(found) == "± 30.8 | –"
-    (found,) = parameter_rows([replace(left, uncertainty=4.0), replace(right, uncertainty=5.0)])
-    assert say_plus_minus(found) == "± 4.0 | 5.0"
-    (found,) = parameter_rows([left, right])
-    assert say_plus_minus(found) == ""
+    (rows,) = parameter_rows([replace(left, n=2, uncertainty=30.8), replace(right, n=1, sd=None)])
+    assert say_plus_minus(rows) == "± 30.8 | –"
+    (rows,) = parameter_rows([replace(left, uncertainty=4.0), replace(right, uncertainty=5.0)])
+    assert say_plus_minus(rows) == "± 4.0 | 5.0"
+    (rows,) = parameter_rows([left, right])
+    assert say_plus_minus(rows) == ""
 
 
 def test_no_number_is_known_to_nothing() -> None:
-    (found,) = parameter_rows(
+    (rows,) = parameter_rows(
         [Parameter("cadence_spm", None, 4000, 111.2, 1.9, "steps/min", uncertainty=0.08)]
     )
-    assert found.both is not None
-    assert (found.both.text, found.both.plus_minus) == ("111", "± 0.1")
+    assert rows.both is not None
+    assert (rows.both.text, rows.both.plus_minus) == ("111", "± 0.1")
 
 
 def test_a_missing_number_gives_its_reason_never_zero() -> None:
-    both = rows_of(
+    pair = rows_of(
         of("stance_pct", "left", None, "no_terminal_contact"),
         of("stance_pct", "right", None, "no_terminal_contact"),
     )
-    assert both[0].reason == "not measured: no foot-off detected"
-    assert both[0].left is None
+    assert pair[0].reason == "not measured: no foot-off detected"
+    assert pair[0].left is None
     one = rows_of(of("stance_pct", "left", 61.0), of("stance_pct", "right", None, "no_strides"))[0]
     assert one.reason is None
     assert one.right is None
@@ -168,10 +170,10 @@ def test_a_side_withheld_beside_an_estimated_one_says_why() -> None:
     name = "knee_flexion_min_stance_deg"
     left = Parameter(name, "left", 9, 4.8, 5.6, "deg", estimated=True)
     right = Parameter(name, "right", 0, None, None, "deg", "at_bound", estimated=True)
-    (found,) = parameter_rows((left, right))
-    assert found.side_reason == "not reported: the knee of the leg model is at its limit"
-    assert found.difference == f"right {found.side_reason}"
-    assert (found.low_confidence, found.reason) == (True, None)
+    (rows,) = parameter_rows((left, right))
+    assert rows.side_reason == "not reported: the knee of the leg model is at its limit"
+    assert rows.difference == f"right {rows.side_reason}"
+    assert (rows.low_confidence, rows.reason) == (True, None)
 
 
 def test_the_csv_says_why_a_side_has_no_number_and_keeps_the_rows_of_the_whole_take(bundle: Bundle) -> None:
@@ -183,11 +185,11 @@ def test_the_csv_says_why_a_side_has_no_number_and_keeps_the_rows_of_the_whole_t
         )
     )
     model = replace(report_model(bundle, age=40, speed_mps=1.2), groups=(("", rows),))
-    told = [
+    notices = [
         (r["name"], r["side"], r["mean"] == "", r["reason"] == "")
         for r in csv.DictReader(io.StringIO(parameters_csv(model).decode()))
     ]
-    assert sorted(told) == [
+    assert sorted(notices) == [
         ("pci_pct", "", True, False),
         ("stance_pct", "left", False, True),
         ("stance_pct", "right", True, False),
@@ -195,9 +197,9 @@ def test_the_csv_says_why_a_side_has_no_number_and_keeps_the_rows_of_the_whole_t
 
 
 def test_an_unknown_parameter_is_shown_under_its_own_name() -> None:
-    found = rows_of(of("new_index", None, 3.0))[0]
-    assert (found.title, found.group) == ("new_index", "Other")
-    assert found.both is not None
+    rows = rows_of(of("new_index", None, 3.0))[0]
+    assert (rows.title, rows.group) == ("new_index", "Other")
+    assert rows.both is not None
 
 
 def test_box_counts_strides_and_names_the_worst_sensor(bundle: Bundle) -> None:
@@ -216,8 +218,8 @@ def test_box_says_how_many_checks_of_the_calibration_fail(make_bundle: MakeBundl
     verdicts = ("pass", "redo", "pass", "not_judged")
     score = {"checks": [{"verdict": v} for v in verdicts]}
     items = {i.label: i for i in report_model(make_bundle(calibration_score=score)).quality.items}
-    told = items["Calibration"]
-    assert (told.value, told.kind, told.page) == ("2 of 3 checks", "warn", "calibration")
+    notices = items["Calibration"]
+    assert (notices.value, notices.kind, notices.page) == ("2 of 3 checks", "warn", "calibration")
 
 
 @pytest.mark.parametrize(
@@ -276,8 +278,8 @@ def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: 
 
 def test_slow_walking_keeps_the_norm_of_speed_itself(bundle: Bundle) -> None:
     speed = Parameter("gait_speed_mps", None, 20, 0.2, 0.05, "m/s")
-    others = tuple(p for p in bundle.parameters if p.name != speed.name)
-    model = report_model(replace(bundle, parameters=(speed, *others)), age=40, sex="female")
+    remaining = tuple(p for p in bundle.parameters if p.name != speed.name)
+    model = report_model(replace(bundle, parameters=(speed, *remaining)), age=40, sex="female")
     assert model.norm_note.startswith("No norm at this speed")
     assert "Gait speed: adults 21–84 years (Fukuchi" in model.norm_note
     rows = {r.name: r for _, group in model.groups for r in group}
@@ -327,10 +329,10 @@ def test_replay_data_is_what_the_clock_needs(bundle: Bundle) -> None:
 
 
 def test_sides_are_compared_in_numbers_and_words() -> None:
-    found = row(rows_of(*both("step_length_m", 0.39, 0.25)), "step_length_m")
-    assert found.symmetry is not None
-    assert found.symmetry.index_pct == pytest.approx(43.75)
-    assert found.symmetry_words == (
+    result = row(rows_of(*both("step_length_m", 0.39, 0.25)), "step_length_m")
+    assert result.symmetry is not None
+    assert result.symmetry.index_pct == pytest.approx(43.75)
+    assert result.symmetry_words == (
         "left / right 1.56, symmetry index +43.8 % (positive: left larger), "
         "symmetry angle −13.7 % (negative: left larger)"
     )
@@ -397,8 +399,8 @@ def test_shares_of_the_stride_have_their_place_where_the_contacts_are_exact(make
     for bundle, placed in ((exact, True), (coarse, False)):
         rows = tuple(r for _, rows in report_model(bundle, age=72, sex="female").groups for r in rows)
         for name in ("stance_pct", "swing_pct", "double_support_pct"):
-            found = row(rows, name)
-            assert (found.norm is not None) == placed
-            assert bool(found.z_words) == placed
-            assert placed or "too uncertain" in found.norm_note
+            result = row(rows, name)
+            assert (result.norm is not None) == placed
+            assert bool(result.z_words) == placed
+            assert placed or "too uncertain" in result.norm_note
         assert row(rows, "stride_time_s").norm is not None

@@ -18,7 +18,7 @@ def test_the_reason_is_what_stopped_it_then_the_test_then_the_sensors(make_bundl
         "sensor": "pelvis",
         "corrected": False,
     }
-    said = explain_no_figure(make_bundle(warnings=(stopped,), functional=test))
-    assert said.endswith("the analysis stopped before it. right shank: long axis 76° off the vertical.")
+    message = explain_no_figure(make_bundle(warnings=(stopped,), functional=test))
+    assert message.endswith("the analysis stopped before it. right shank: long axis 76° off the vertical.")
     assert explain_no_figure(make_bundle(functional=test)).endswith(OF_A_TEST)
     assert explain_no_figure(make_bundle()).endswith(FEW_SENSORS)

@@ -1,4 +1,4 @@
-"""What is said beside tables and curves."""
+"""Notes accompanying tables and curves."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from tests.server.report.conftest import MakeBundle
 
 
 def controls(**changes: Any) -> ControlGroup:
-    made = {"n": 12, "group": "own controls", "source": "this clinic", "values": {}, "bands": {}}
-    return ControlGroup(**{**made, "reference": None, "reason": None, "note": None, **changes})
+    result = {"n": 12, "group": "own controls", "source": "this clinic", "values": {}, "bands": {}}
+    return ControlGroup(**{**result, "reference": None, "reason": None, "note": None, **changes})
 
 
 def shown(bundle: Bundle, **options: Any) -> ReportModel:
@@ -28,15 +28,15 @@ def shown(bundle: Bundle, **options: Any) -> ReportModel:
 
 
 def panel(bundle: Bundle, **changes: Any) -> CurvePanel:
-    found = next(p for p in shown(bundle).panels if p.reason is None and p.sides)
-    return replace(found, **changes)
+    item = next(p for p in shown(bundle).panels if p.reason is None and p.sides)
+    return replace(item, **changes)
 
 
 def test_without_a_norm_the_note_is_the_reason_and_each_reason_is_told_once() -> None:
     reason = "no_norm_for_age"
     assert norm_note([], [], Norms(None, None, reason=reason, timing_reason=reason)) == NO_NORM[reason]
-    other = norm_note([], [], Norms(None, None, reason=reason, timing_reason="age_unknown"))
-    assert other == f"{NO_NORM[reason]} {NO_NORM['age_unknown']}"
+    alternative = norm_note([], [], Norms(None, None, reason=reason, timing_reason="age_unknown"))
+    assert alternative == f"{NO_NORM[reason]} {NO_NORM['age_unknown']}"
 
 
 def test_own_controls_say_how_many_they_are() -> None:
@@ -55,14 +55,14 @@ def test_the_people_of_a_band_are_named_where_an_angle_is_compared(bundle: Bundl
     assert not norms.comfortable_bands
     band = next(iter(norms.bands.values()))
     drawn = panel(bundle, norm=replace(band, zero="anatomical"))
-    said = norm_note([], [drawn], norms)
-    assert said.startswith(f"Norm: {band.n} ")
-    assert said.endswith(f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source}).")
+    message = norm_note([], [drawn], norms)
+    assert message.startswith(f"Norm: {band.n} ")
+    assert message.endswith(f"1.25 ± 0.16 m/s, mean ± 1 SD ({band.source}).")
     assert norm_note([], [panel(bundle, norm=replace(band, zero="standing"))], norms) == ""
 
 
 def test_too_few_strides_are_told_once(bundle: Bundle) -> None:
-    rows = [r for _, found in shown(bundle).groups for r in found][:3]
+    rows = [r for _, result in shown(bundle).groups for r in result][:3]
     few = [replace(r, norm_note=FEW_NOTE, norm=None) for r in rows]
     assert norm_note(few, [], Norms(None, None)) == FEW_NOTE
 
@@ -75,8 +75,8 @@ def test_the_zero_of_curves_is_told_with_what_was_subtracted(bundle: Bundle) -> 
     assert bundle.angles is not None
     offsets = {"knee_flexion_l": np.radians(4.6), "hip_adduction_l": 0.1, "ankle_dorsiflexion_x": 0.1}
     stood = replace(bundle, angles=replace(bundle.angles, zero_offset=offsets))
-    said = notes(stood, panel(bundle, zero="standing"))
-    assert "Subtracted: knee flexion left 5°. A person" in said
+    message = notes(stood, panel(bundle, zero="standing"))
+    assert "Subtracted: knee flexion left 5°. A person" in message
     walked = notes(bundle, panel(bundle, zero="walking"))
     assert walked.startswith("Nobody stood still in this take")
     assert "Subtracted" not in walked

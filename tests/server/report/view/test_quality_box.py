@@ -1,4 +1,4 @@
-"""What the badge of the data says: one fault once and by name, and nothing for what changes no number."""
+"""Data quality badge: each fault once by name, none for what changes no number."""
 
 from __future__ import annotations
 
@@ -40,15 +40,15 @@ def texts(notices: Sequence[Notice]) -> list[str]:
 
 
 def test_a_sensor_that_ended_early_is_one_notice() -> None:
-    (told, other) = join_faults((ENDED, GAP, OTHER, FAILED))[::-1]
-    assert (told.code, told.sensor, told.t_s) == ("sensor_failed", "shank_l", 18.0)
-    assert told.message == f"{ENDED.message} {FAILED.message}"
-    assert other == OTHER
+    (messages, second) = join_faults((ENDED, GAP, OTHER, FAILED))[::-1]
+    assert (messages.code, messages.sensor, messages.t_s) == ("sensor_failed", "shank_l", 18.0)
+    assert messages.message == f"{ENDED.message} {FAILED.message}"
+    assert second == OTHER
 
 
 def test_a_foot_sensor_that_stuck_is_one_notice() -> None:
-    (told,) = join_faults((STUCK, NO_FOOT, FOOT_FAILED))
-    assert told.message == f"{STUCK.message} {FOOT_FAILED.message}"
+    (messages,) = join_faults((STUCK, NO_FOOT, FOOT_FAILED))
+    assert messages.message == f"{STUCK.message} {FOOT_FAILED.message}"
 
 
 def test_faults_of_different_sensors_stay_apart() -> None:
@@ -94,13 +94,13 @@ def test_a_row_that_a_file_lost_is_information() -> None:
 
 
 def test_daily_life_without_a_complete_day_is_not_good_data() -> None:
-    found = daily.live(3)
-    short = replace(found, days=tuple(replace(day, worn_h=4.0) for day in found.days))
+    live_result = daily.live(3)
+    short = replace(live_result, days=tuple(replace(day, worn_h=4.0) for day in live_result.days))
     whole, blank = (
         quality_box(
             Bundle({"level": "good"}, None, parameters, (), {}, activity=activity),
         )
-        for parameters, activity in ((measure_day(found), found), (measure_day(short), short))
+        for parameters, activity in ((measure_day(live_result), live_result), (measure_day(short), short))
     )
     assert (whole.kind, whole.word, whole.reason) == ("ok", "Good data", "")
     assert (blank.kind, blank.word, blank.reason) == ("warn", "No complete day", NO_WHOLE_DAY)

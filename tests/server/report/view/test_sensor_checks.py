@@ -1,4 +1,4 @@
-"""What the data page says of the clock and place of every sensor."""
+"""Clock and placement of each sensor on the data page."""
 
 from __future__ import annotations
 
@@ -62,10 +62,10 @@ def test_what_was_found_stands_in_its_row() -> None:
 
 
 def test_a_sensor_without_a_neighbour_is_judged_in_nothing() -> None:
-    alone = sensor("foot_l", clock_judged=False, place_judged_s=None)
-    view = sensor_checks(found(alone, {**alone, "sensor": "foot_r"}))
+    single = sensor("foot_l", clock_judged=False, place_judged_s=None)
+    view = sensor_checks(found(single, {**single, "sensor": "foot_r"}))
     assert view is not None
     assert (view.rows[0].clock, view.rows[0].place) == (f"Clock {NOT_JUDGED}", f"Placement {NOT_JUDGED}")
     assert not any("pelvis" in n or "loosen" in n for n in view.notes)
-    assert sensor_checks(found(alone)) is None
+    assert sensor_checks(found(single)) is None
     assert sensor_checks(None) is None

@@ -34,10 +34,10 @@ def angles(**changes: Floats) -> JointAngles:
     return JointAngles(t, out, dict.fromkeys(out, 0.1))
 
 
-def view(bundle: Bundle, *found: StoredRepetition, moved: JointAngles | None = None) -> SquatView:
-    shown = squat_view(replace(bundle, repetitions=found, angles=moved))
-    assert shown is not None
-    return shown
+def view(bundle: Bundle, *result: StoredRepetition, moved: JointAngles | None = None) -> SquatView:
+    visible_rows = squat_view(replace(bundle, repetitions=result, angles=moved))
+    assert visible_rows is not None
+    return visible_rows
 
 
 def test_a_take_without_squats_has_none(bundle: Bundle) -> None:
@@ -47,55 +47,55 @@ def test_a_take_without_squats_has_none(bundle: Bundle) -> None:
 
 
 def test_squats_are_numbered_by_leg_and_told_in_words(bundle: Bundle) -> None:
-    found = view(bundle, squat("left", 0.0), squat("right", 2.0), squat("left", 4.0, "foot_moved"))
-    assert [(r.number, r.side) for r in found.rows] == [(1, "left"), (1, "right"), (2, "left")]
-    first, _, moved = found.rows
+    result = view(bundle, squat("left", 0.0), squat("right", 2.0), squat("left", 4.0, "foot_moved"))
+    assert [(r.number, r.side) for r in result.rows] == [(1, "left"), (1, "right"), (2, "left")]
+    first, _, moved = result.rows
     assert (first.start, first.depth, first.valgus, first.drop, first.duration) == (
         "0.0", "91", "−5", "0.35", "2.5"
     )  # fmt: skip
     assert first.excluded is None
     assert (moved.depth, moved.drop, moved.excluded) == ("–", "–", "the foot moved")
-    assert found.used == {"left": 1, "right": 1}
-    assert (found.sides, found.title) == (("left", "right"), "both legs")
-    assert found.spans[2] == SquatSpan("left", 4.0, 6.0, False)
+    assert result.used == {"left": 1, "right": 1}
+    assert (result.sides, result.title) == (("left", "right"), "both legs")
+    assert result.spans[2] == SquatSpan("left", 4.0, 6.0, False)
 
 
 def test_bends_with_the_foot_off_the_floor_are_no_squats_and_are_told(bundle: Bundle) -> None:
-    found = view(
+    result = view(
         bundle,
         squat("left", 0.0),
         squat("right", 1.0, FOOT_LIFTED),
         squat("left", 2.0, FOOT_LIFTED),
         squat("right", 3.0, FOOT_LIFTED),
     )
-    assert len(found.rows) == 1
-    assert found.title == "left leg"
-    assert found.not_listed == (
+    assert len(result.rows) == 1
+    assert result.title == "left leg"
+    assert result.not_listed == (
         "Knee flexion with the foot off the floor is not counted as a squat: 1 of the left knee and 2 "
         "of the right knee."
     )
-    assert found.to_json()["bends_with_lifted_foot"] == {"left": 1, "right": 2}
+    assert result.to_json()["bends_with_lifted_foot"] == {"left": 1, "right": 2}
     assert view(bundle, squat("left", 0.0)).not_listed == ""
 
 
 def test_curves_are_means_of_the_squats_that_count_and_say_where_the_level_is_unsure(bundle: Bundle) -> None:
-    found = view(
+    result = view(
         bundle, squat("left", 0.0), squat("left", 2.0), squat("left", 4.0, "foot_moved"), moved=angles()
     )
-    assert found.means_deg["knee_flexion"]["left"][50] == pytest.approx(15.0)
-    assert [(c["title"], c["low"]) for c in found.charts] == [
+    assert result.means_deg["knee_flexion"]["left"][50] == pytest.approx(15.0)
+    assert [(c["title"], c["low"]) for c in result.charts] == [
         ("Knee flexion", False),
         ("Hip adduction", True),
     ]
-    assert all(c["reason"] is None and str(c["svg"]).startswith("<div") for c in found.charts)
+    assert all(c["reason"] is None and str(c["svg"]).startswith("<div") for c in result.charts)
     assert set(SURE) & {VALGUS, "hip_adduction", "hip_rotation"} == set()
 
 
 def test_an_angle_that_is_not_known_throughout_any_squat_has_no_curve_but_a_reason(bundle: Bundle) -> None:
     lost = angles(hip_adduction_l=np.where(angles().t_s % 2.0 < 0.5, np.nan, 0.0))
-    found = view(bundle, squat("left", 0.0), moved=lost)
-    assert [c["reason"] for c in found.charts] == [None, "not available throughout any squat"]
-    assert found.means_deg["hip_adduction"] == {}
+    result = view(bundle, squat("left", 0.0), moved=lost)
+    assert [c["reason"] for c in result.charts] == [None, "not available throughout any squat"]
+    assert result.means_deg["hip_adduction"] == {}
 
 
 def test_without_angles_or_a_squat_that_counts_nothing_is_drawn(bundle: Bundle) -> None:

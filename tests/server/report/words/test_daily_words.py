@@ -32,14 +32,17 @@ def test_minutes_are_said_as_hours(minutes: float, said: str) -> None:
 
 
 def test_a_moment_has_the_day_and_time_of_the_clock() -> None:
-    found = daily.live(2.0)
+    live_result = daily.live(2.0)
     at_s = 7.5 * HOUR_S  # the recording begins at 18:00
-    assert (find_day_label(found, at_s), clock_label(found, at_s)) == ("Tue 17 Nov", "01:30")
-    assert find_midnight(found, at_s) == 6 * HOUR_S
-    assert find_day_label(found, 3 * DAY_S) == ""
+    assert (find_day_label(live_result, at_s), clock_label(live_result, at_s)) == ("Tue 17 Nov", "01:30")
+    assert find_midnight(live_result, at_s) == 6 * HOUR_S
+    assert find_day_label(live_result, 3 * DAY_S) == ""
 
 
 def test_without_a_clock_a_moment_counts_from_the_first_sample() -> None:
-    found = daily.live(1.5, clock=False)
-    assert (find_day_label(found, 25 * HOUR_S), clock_label(found, 25 * HOUR_S)) == ("Day 2", "01:00")
-    assert find_midnight(found, 25 * HOUR_S) == DAY_S
+    live_result = daily.live(1.5, clock=False)
+    assert (find_day_label(live_result, 25 * HOUR_S), clock_label(live_result, 25 * HOUR_S)) == (
+        "Day 2",
+        "01:00",
+    )
+    assert find_midnight(live_result, 25 * HOUR_S) == DAY_S

@@ -18,12 +18,12 @@ from sagittal.server.report.words.estimator import (
 from tests.server.report.conftest import MakeBundle
 
 
-def finding(name: str, of: str | None, value: float | None, verdict: str = "good") -> dict[str, Any]:
-    return {"name": name, "of": of, "value": value, "warn": 25.0, "bad": 80.0, "verdict": verdict}
+def finding(name: str, source: str | None, value: float | None, verdict: str = "good") -> dict[str, Any]:
+    return {"name": name, "of": source, "value": value, "warn": 25.0, "bad": 80.0, "verdict": verdict}
 
 
 def section(**changes: Any) -> dict[str, Any]:
-    made: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "name": "erkf_smoothed",
         "requested": "auto",
         "reduced": None,
@@ -40,7 +40,7 @@ def section(**changes: Any) -> dict[str, Any]:
         "estimated_angles": [],
         "diagnostics": {},
     }
-    return made | changes
+    return fields | changes
 
 
 def test_it_is_named_with_its_sensors_and_verdict() -> None:
@@ -72,9 +72,9 @@ def test_the_choice_offers_what_the_sensors_allow_and_marks_what_ran() -> None:
     assert view is not None
     assert [v for v, _, _ in view.choices] == ["auto", "erkf", "l7s_2i", "stance_foot_anchor"]
     assert [v for v, _, on in view.choices if on] == ["auto"]
-    asked = estimator_view(section(name="l7s_2i", requested="l7s_2i"))
-    assert asked is not None
-    assert [v for v, _, on in asked.choices if on] == ["l7s_2i"]
+    requests = estimator_view(section(name="l7s_2i", requested="l7s_2i"))
+    assert requests is not None
+    assert [v for v, _, on in requests.choices if on] == ["l7s_2i"]
 
 
 @pytest.mark.parametrize("estimator", ESTIMATORS, ids=lambda e: e.name)

@@ -27,7 +27,7 @@ def words(label: str, **changes: Any) -> str:
 
 def test_the_record_is_read_in_the_order_in_which_a_therapist_fills_it_in() -> None:
     labels = [label for label, _ in prescription_words(prescription())]
-    assert labels == ["Trained", "Target", "Zone", "Shown as", "Schedule", "Level", "Ends", "Watched"]
+    assert labels == ["Trained", "Target", "Zone", "Display name", "Schedule", "Level", "Ends", "Watched"]
 
 
 def test_a_target_is_named_by_parameter_and_side() -> None:
@@ -77,9 +77,9 @@ def test_a_schedule_says_shares_probes_and_retention() -> None:
 
 
 def test_what_is_shown_and_of_which_strides() -> None:
-    assert words("Shown as", modes=["bar", "tone"]) == "a bar, a tone outside the zone"
-    assert words("Shown as", positive_only=True) == "a bar; only strides in the zone"
-    assert words("Shown as", bandwidth=True) == "a bar; only strides outside the zone"
+    assert words("Display name", modes=["bar", "tone"]) == "a bar, a tone outside the zone"
+    assert words("Display name", positive_only=True) == "a bar; only strides in the zone"
+    assert words("Display name", bandwidth=True) == "a bar; only strides outside the zone"
 
 
 def test_zone_and_level_say_their_width_and_when_it_becomes_harder() -> None:

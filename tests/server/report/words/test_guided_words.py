@@ -1,4 +1,4 @@
-"""What a person in a guided test is told, in every phase of every test."""
+"""Instructions of a guided test in every phase of every test."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def test_every_guided_test_has_words_a_hint_and_a_figure_of_the_catalogue() -> N
 @pytest.mark.parametrize("protocol", GUIDED)
 def test_every_phase_has_words_and_after_the_test_the_person_may_rest(protocol: str) -> None:
     phases = get_args(TestPhase)
-    told = {phase: tell_person(protocol, phase) for phase in phases}
+    by_phase = {phase: tell_person(protocol, phase) for phase in phases}
     assert set(SAYS[protocol]) < set(phases)
-    assert {phase for phase in phases if told[phase] == OVER} == set(phases) - set(SAYS[protocol])
-    assert len(set(told.values())) == len(SAYS[protocol]) + 1
+    assert {phase for phase in phases if by_phase[phase] == OVER} == set(phases) - set(SAYS[protocol])
+    assert len(set(by_phase.values())) == len(SAYS[protocol]) + 1
 
 
 @pytest.mark.parametrize("protocol", sorted(set(GUIDED) - set(STANDING_TESTS)))

@@ -38,8 +38,8 @@ def test_estimated_angles_are_held_against_nothing(make_bundle: MakeBundle) -> N
     bundle = make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"]))
     limits = report_model(bundle).limits
     assert limits is not None
-    judged = {row.name for row in (*limits.beyond, *limits.within)}
-    assert not any("knee" in name.lower() for name in judged)
+    names = {row.name for row in (*limits.beyond, *limits.within)}
+    assert not any("knee" in name.lower() for name in names)
 
 
 def test_without_counted_strides_there_are_none(make_bundle: MakeBundle) -> None:

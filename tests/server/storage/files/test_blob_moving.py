@@ -41,28 +41,28 @@ def test_files_and_trash_go_and_what_is_damaged_or_still_coming_stays(
 ) -> None:
     folder = FolderBlobs(settings.blobs)
     whole, bad, old = (folder.put(SPACE, content) for content in (b"walk", b"bad", b"old"))
-    other = folder.put("b" * 32, b"another patient's")
+    other_response = folder.put("b" * 32, b"another patient's")
     folder.path(SPACE, bad.sha256).write_bytes(b"bat")
     folder.trash.prepare([(SPACE, old.sha256)], AT)
     folder.trash.take([(SPACE, old.sha256)], AT)
     (folder.root / INCOMING).mkdir(exist_ok=True)
     (folder.root / INCOMING / "half").write_bytes(b"ha")
-    there = replace(settings, bucket=bucket.url)
+    target = replace(settings, bucket=bucket.url)
 
-    moved = move_blobs(there)
-    assert (moved.files, moved.size, moved.trashed) == (2, whole.size + other.size, 1)
+    moved = move_blobs(target)
+    assert (moved.files, moved.size, moved.trashed) == (2, whole.size + other_response.size, 1)
     assert moved.damaged == (f"{SPACE}/{bad.sha256}",)
     assert folder.path(SPACE, bad.sha256).read_bytes() == b"bat"
     assert (folder.root / INCOMING / "half").exists()
     assert not (folder.root / ("b" * 32)).exists()
     assert list(folder.trash.files()) == []
 
-    blobs = open_blobs(there)
+    blobs = open_blobs(target)
     assert blobs.read(SPACE, whole.sha256) == b"walk"
     assert [one.name for one in blobs.trash.files()] == [old.sha256]
-    assert (is_moving(there), read_note(there)) == (False, bucket.url)
-    again = move_blobs(there)  # what has come into the folder since
-    assert (again.files, again.trashed, again.damaged) == (0, 0, moved.damaged)
+    assert (is_moving(target), read_note(target)) == (False, bucket.url)
+    second = move_blobs(target)  # what has come into the folder since
+    assert (second.files, second.trashed, second.damaged) == (0, 0, moved.damaged)
 
 
 def test_a_prefix_in_which_something_is_belongs_to_somebody_else(
@@ -71,8 +71,8 @@ def test_a_prefix_in_which_something_is_belongs_to_somebody_else(
 ) -> None:
     blob = FolderBlobs(settings.blobs).put(SPACE, b"walk")
     bucket.write("another's", b"file")
-    there = replace(settings, bucket=bucket.url)
+    target = replace(settings, bucket=bucket.url)
     with pytest.raises(SettingsError, match="is not empty"):
-        move_blobs(there)
+        move_blobs(target)
     assert FolderBlobs(settings.blobs).has(SPACE, blob.sha256)
-    assert not is_moving(there)
+    assert not is_moving(target)

@@ -1,4 +1,4 @@
-"""What people do to the trash by hand does not stop the server, and nothing outside of it is touched."""
+"""Manual changes to the trash do not stop the server, and nothing outside is touched."""
 
 from __future__ import annotations
 

@@ -54,10 +54,10 @@ def test_only_the_verbs_that_are_named_are_refused() -> None:
 
 
 def test_postgres_refuses_truncation_with_deletion_and_only_with_it() -> None:
-    refuse, *made = write_triggers("postgresql", "log", ("UPDATE", "DELETE"), KEEP)
+    refuse, *result = write_triggers("postgresql", "log", ("UPDATE", "DELETE"), KEEP)
     assert refuse.startswith("CREATE OR REPLACE FUNCTION refuse_change()")
     call = f"EXECUTE FUNCTION refuse_change('{KEEP}')"
-    assert made == [
+    assert result == [
         f"CREATE TRIGGER log_no_update BEFORE UPDATE ON log FOR EACH ROW {call}",
         f"CREATE TRIGGER log_no_delete BEFORE DELETE ON log FOR EACH ROW {call}",
         f"CREATE TRIGGER log_no_truncate BEFORE TRUNCATE ON log FOR EACH STATEMENT {call}",
@@ -66,5 +66,5 @@ def test_postgres_refuses_truncation_with_deletion_and_only_with_it() -> None:
 
 
 def test_a_table_on_sqlite_gets_none_of_the_statements_of_postgres(connection: Connection) -> None:
-    made = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'trigger'").scalars()
-    assert sorted(made) == ["log_no_delete", "log_no_update"]
+    scalars = connection.exec_driver_sql("SELECT name FROM sqlite_master WHERE type = 'trigger'").scalars()
+    assert sorted(scalars) == ["log_no_delete", "log_no_update"]

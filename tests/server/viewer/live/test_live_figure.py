@@ -1,4 +1,4 @@
-"""A live figure against the replay of the same walk, and what it leaves on the floor."""
+"""Live avatar compared with the replay of the same walk, and its footprints."""
 
 from __future__ import annotations
 
@@ -149,15 +149,15 @@ def test_the_trails_are_the_last_seconds_of_the_soles_way(server: viser.ViserSer
     scene = Scene(server)
     i = scene.play(poses, 11.0)
     pieces = np.asarray(scene["/trails"].points)
-    q, p = (np.stack([of[s] for s in poses.q], axis=1) for of in (poses.q, poses.p))
+    q, p = (np.stack([source[s] for s in poses.q], axis=1) for source in (poses.q, poses.p))
     soles = FigureLayout(tuple(poses.q), walk.BODY, "").place(q, p).soles
     for side, drawn in zip(SIDES, np.split(pieces, 2), strict=True):
-        seen = drawn[drawn[:, 0, 2] > -1.0]
+        observations = drawn[drawn[:, 0, 2] > -1.0]
         path = soles[side][: i + 1]
         late = path[poses.t_s[: i + 1] >= 11.0 - TRAIL_S - 0.2]
-        assert 0.9 * TRAIL_S * 1.2 < np.ptp(seen[..., 0]) <= np.ptp(late[:, 0]) + PIECE_M
-        assert np.linalg.norm(seen[:, 1] - seen[:, 0], axis=1).min() >= PIECE_M - 1e-6
-        nearest = np.abs(seen[:, 1, None, 0] - path[None, :, 0]).min(axis=1)
+        assert 0.9 * TRAIL_S * 1.2 < np.ptp(observations[..., 0]) <= np.ptp(late[:, 0]) + PIECE_M
+        assert np.linalg.norm(observations[:, 1] - observations[:, 0], axis=1).min() >= PIECE_M - 1e-6
+        nearest = np.abs(observations[:, 1, None, 0] - path[None, :, 0]).min(axis=1)
         assert nearest.max() < 1e-5
 
 
@@ -187,10 +187,10 @@ def test_prints_lie_where_the_replay_has_them(server: viser.ViserServer, poses: 
     scene.play(poses, 11.0)
     for side in SIDES:
         node = scene[f"/prints_{side}"]
-        shown = np.asarray(node.batched_positions)[np.asarray(node.batched_scales) > 0]
-        assert len(shown) == PRINTS
-        known = replay.prints[side].position
-        apart = np.linalg.norm(shown[:, None] - known[None], axis=-1)
+        visible_values = np.asarray(node.batched_positions)[np.asarray(node.batched_scales) > 0]
+        assert len(visible_values) == PRINTS
+        known_position = replay.prints[side].position
+        apart = np.linalg.norm(visible_values[:, None] - known_position[None], axis=-1)
         assert apart.min(axis=1).max() < 0.02
         assert len(set(apart.argmin(axis=1))) == PRINTS
 
@@ -208,10 +208,10 @@ def test_the_camera_follows_a_walk_without_delay_and_without_its_sway(sway_m: fl
     path = LivePath()
     t = np.arange(300) / RATE_HZ
     place = np.stack((1.2 * t, sway_m * np.sin(2 * np.pi * t / 1.2)), axis=1)
-    found = np.array(
+    values = np.array(
         [path.push(s, x, y, 3.0)[:2] for s, (x, y) in zip(t.tolist(), place.tolist(), strict=True)]
     )
-    steady = found[90:]
+    steady = values[90:]
     np.testing.assert_allclose(steady[:, 0], place[90:, 0], atol=0.02)
     assert np.abs(steady[:, 1]).max() <= 0.15 * sway_m + 1e-9
 
@@ -219,8 +219,8 @@ def test_the_camera_follows_a_walk_without_delay_and_without_its_sway(sway_m: fl
 def test_a_heading_may_turn_through_the_back() -> None:
     path = LivePath()
     turned = [(3.0 + 0.01 * k + np.pi) % (2 * np.pi) - np.pi for k in range(90)]
-    found = [path.push(k / RATE_HZ, 0.0, 0.0, x) for k, x in enumerate(turned)]
-    assert found[-1][2] == pytest.approx(3.89, abs=0.02)
+    frames = [path.push(k / RATE_HZ, 0.0, 0.0, x) for k, x in enumerate(turned)]
+    assert frames[-1][2] == pytest.approx(3.89, abs=0.02)
 
 
 FEET = ("foot_l", "foot_r")
@@ -229,7 +229,7 @@ FEET = ("foot_l", "foot_r")
 def ghosts_of(scene: Scene) -> set[str]:
     """Parts of the ghost that is in the scene."""
     names = (re.fullmatch(r"/room/ghost_(\w+)_\d+", n) for n in scene.server.scene._handle_from_node_name)
-    return {found[1] for found in names if found}
+    return {result[1] for result in names if result}
 
 
 def ghost_of(scene: Scene, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -245,10 +245,10 @@ def test_the_ghost_of_the_norm_has_the_angles_of_the_norm_beside_the_person(
     for i in range(120, 150, 4):
         now = moment(poses, i)
         scene.figure.show(now)
-        at, (pelvis,) = ghost_of(scene, "pelvis")
+        position, (pelvis,) = ghost_of(scene, "pelvis")
         thighs, shanks = (ghost_of(scene, name)[1] for name in ("thighs", "shanks"))
         soles, feet = (np.concatenate(x) for x in zip(*(ghost_of(scene, n) for n in FEET), strict=True))
-        np.testing.assert_allclose(at[0, :2], now.p[now.segments.index("pelvis"), :2], atol=1e-5)
+        np.testing.assert_allclose(position[0, :2], now.p[now.segments.index("pelvis"), :2], atol=1e-5)
         for k, side in enumerate(SIDES):
             row = round(100 * float(now.phase[side] or 0.0))
             for name, proximal, distal, sign in (
@@ -303,7 +303,7 @@ def test_the_ghost_walks_where_the_person_walks(server: viser.ViserServer, poses
 @pytest.mark.bench
 def test_a_moment_costs_little(server: viser.ViserServer, poses: Poses) -> None:
     layout = FigureLayout(tuple(poses.q), walk.BODY, "erkf")
-    q, p = (np.stack([of[s][:1] for s in poses.q], axis=1) for of in (poses.q, poses.p))
+    q, p = (np.stack([source[s][:1] for s in poses.q], axis=1) for source in (poses.q, poses.p))
     took = []
     for _ in range(200):
         began = time.thread_time()
@@ -330,9 +330,9 @@ def test_a_frame_is_a_few_small_messages(
     scene.figure.set_reference(ReferenceWalk(NORM, walk.BODY) if ghost else None)
     scene.play(poses, 2.0)
     sent = server._websock_server._broadcast_buffer.message_from_id
-    before = set(sent)
+    initial_names = set(sent)
     scene.figure.show(moment(poses, 61))
-    new = [m for k, m in sent.items() if k not in before]
+    new = [m for k, m in sent.items() if k not in initial_names]
     poses_sent = [
         m.updates for m in new if isinstance(m, SceneNodeUpdateMessage) and "batched_wxyzs" in m.updates
     ]

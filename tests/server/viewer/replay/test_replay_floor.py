@@ -1,4 +1,4 @@
-"""What is on the floor of a real viser scene at a moment, and that the moment costs little."""
+"""Floor elements of a real viser scene at a moment, and their cost."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class Scene:
     def drawn(self, side: str) -> np.ndarray:
         """Pieces (k, 2, 3) of the trail of a side that are to be seen, in order of time."""
         chunks = [n for name, n in self.nodes.items() if name.startswith(f"/room/ground/trail_{side}")]
-        seen = [np.asarray(n.points) for n in chunks if n.visible]
-        return np.concatenate(seen) if seen else np.zeros((0, 2, 3))
+        values = [np.asarray(n.points) for n in chunks if n.visible]
+        return np.concatenate(values) if values else np.zeros((0, 2, 3))
 
     def prints(self, side: str) -> np.ndarray:
         """Which prints of a side are to be seen."""
@@ -128,8 +128,8 @@ def test_following_keeps_the_person_in_the_middle_and_letting_go_keeps_the_room_
         scene.figure.pose(t_s)
         assert np.hypot(*places()[1][:2]) < 1.0
     scene.figure.set_follow(False)
-    still, here = places()
-    assert here[0] > 40
+    still, place = places()
+    assert place[0] > 40
     scene.figure.pose(10.0)
     np.testing.assert_array_equal(places()[0], still)
     assert places()[1][0] < -40

@@ -36,17 +36,17 @@ def check(clinic: Clinic) -> None:
         (this,) = histories.list_analysed(c, pid)
     reviewed = clinic.app.state.reviewed
     motion = prepare_motion(read_poses(analyses.file_bytes(reviewed.blobs, this.found, "poses.parquet")))
-    found = find_references(reviewed, this, patient, motion)
-    assert list(found) == ["norm", "left", "right"]
+    references = find_references(reviewed, this, patient, motion)
+    assert list(references) == ["norm", "left", "right"]
     curves = {side: _average_side(reviewed, this, side) for side in ("left", "right")}
     for side, mine in curves.items():
-        ghost = found[side]()  # type: ignore[index]
+        ghost = references[side]()  # type: ignore[index]
         assert (ghost is not None) == (set(SAGITTAL) <= set(mine)), side
-        assert found[side]() is ghost  # type: ignore[index]
-    norm = found["norm"]()
+        assert references[side]() is ghost  # type: ignore[index]
+    norm = references["norm"]()
     assert norm is not None
     assert len(norm.frames) == len(motion.t_s)
-    assert found["norm"]() is norm
+    assert references["norm"]() is norm
     height_m = norm.batches["pelvis"].position[norm.frames >= 0][..., 2]
     assert np.ptp(height_m) < 0.08, "the pelvis of a healthy walk hardly rises"
     assert 0.85 < height_m.mean() < 0.95
