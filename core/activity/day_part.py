@@ -89,29 +89,29 @@ class DayPart:
 
 
 def read_day(
-    slab: Slab, day: Window, before: WearPeriod | None, thigh_m: float, params: ActivityParams
+    slab: Slab, day: Window, previous: WearPeriod | None, thigh_m: float, params: ActivityParams
 ) -> DayPart:
     """Analyse the time from `day[0]` to `day[1]`, s.
 
     Parameters
     ----------
-    slab : the day with its margins. before : the last wear period of the previous day, None without one.
+    slab : the day with its margins. previous : the last wear period of the previous day, None without one.
     """
     frames = slab.frames
     offset = frames.first / FRAME_HZ
     wear = find_wear(frames, params.wear)
     steps = np.array(slab.steps_s)
     walking = _mark_walking(steps, frames, params)
-    posture, periods = _find_posture(frames, wear, walking, before, params)
+    posture, periods = _find_posture(frames, wear, walking, previous, params)
     lying = find_lying(posture.tilt, frames, posture.known, params.transitions)
     posture, periods = _find_forward(frames, posture, periods, lying, walking, params)
     steps = steps[_are_upright(steps, frames, posture, params)] if len(steps) else steps
     walking = _mark_walking(steps, frames, params)
     leans = find_leans(posture.lean, posture.known, params.transitions)
-    found, refused = judge_leans(leans, posture.lean, frames, lying, walking, thigh_m, params.transitions)
-    found += tell_lying(lying, frames, posture.tilt)
-    at = [_index(t, frames) for t in steps]
-    rocks, trunk = measure_walking(posture.lean, walking, at, params.stairs)
+    accepted, refused = judge_leans(leans, posture.lean, frames, lying, walking, thigh_m, params.transitions)
+    accepted += tell_lying(lying, frames, posture.tilt)
+    step_frames = [_index(t, frames) for t in steps]
+    rocks, trunk = measure_walking(posture.lean, walking, step_frames, params.stairs)
     kinds = tell_stairs(rocks, trunk, params.stairs)
 
     def clip(ranges: Sequence[tuple[int, int]]) -> tuple[Window, ...]:
@@ -131,7 +131,7 @@ def read_day(
         lying=clip([(x.a, x.b) for x in lying if x.still]),
         tilted=clip([(x.a, x.b) for x in lying if not x.still]),
         periods=_describe_periods(periods, day),
-        transitions=tuple(sorted((t for t in found if holds(t.time_s)), key=lambda t: t.time_s)),
+        transitions=tuple(sorted((t for t in accepted if holds(t.time_s)), key=lambda t: t.time_s)),
         candidates=tuple(c for c in refused if holds(c.time_s)),
         steps_s=steps[inside],
         step_kinds=kinds[inside],
@@ -176,21 +176,24 @@ def _mark_walking(steps: Floats, frames: Frames, params: ActivityParams) -> Bool
 
 
 def _are_upright(steps: Floats, frames: Frames, posture: Posture, params: ActivityParams) -> Bools:
-    at = np.array([_index(t, frames) for t in steps])
-    return np.asarray(frames.valid[at] & (~posture.known[at] | (posture.tilt[at] < params.upright_rad)))
+    step_frames = np.array([_index(t, frames) for t in steps])
+    return np.asarray(
+        frames.valid[step_frames]
+        & (~posture.known[step_frames] | (posture.tilt[step_frames] < params.upright_rad))
+    )
 
 
 def _find_posture(
-    frames: Frames, wear: Wear, walking: Bools, before: WearPeriod | None, params: ActivityParams
+    frames: Frames, wear: Wear, walking: Bools, previous: WearPeriod | None, params: ActivityParams
 ) -> tuple[Posture, list[WearPeriod]]:
     """Tilt from the upright direction of each period; a period without one uses that of its neighbour."""
     n, offset = len(frames.valid), frames.first / FRAME_HZ
     groups = group_periods(wear, params.wear)
     own = [find_upright(frames, walking, group, params.upright) for group in groups]
     sure = [axis for axis, method in own if method == "walking"]
-    lent = _array(before.up) if before is not None else sure[0] if sure else None
-    tilt, known = np.zeros(n, np.float32), np.zeros(n, np.bool_)
-    worn = _mark(wear.worn, n) & frames.valid
+    lent = _array(previous.up) if previous is not None else sure[0] if sure else None
+    tilt, is_known = np.zeros(n, np.float32), np.zeros(n, np.bool_)
+    worn_mask = _mark(wear.worn, n) & frames.valid
     periods = []
     for (a, b), (axis, method) in zip(groups, own, strict=True):
         if method != "walking" and lent is not None:
@@ -199,13 +202,13 @@ def _find_posture(
             lent = axis
         periods.append(describe_period(offset + a / FRAME_HZ, offset + b / FRAME_HZ, axis, None, method, 0))
         if axis is not None:
-            known[a:b] = worn[a:b]
+            is_known[a:b] = worn_mask[a:b]
             for part in _cut_hours(a, b):
                 gravity = frames.gravity[part]
                 size = np.maximum(measure_length(gravity), 1e-9)
                 tilt[part] = np.arccos(np.clip(_along(gravity, axis) / size, -1.0, 1.0))
-    tilt[~known] = 0.0
-    return Posture(known, tilt, tilt, np.zeros(n, np.bool_)), periods
+    tilt[~is_known] = 0.0
+    return Posture(is_known, tilt, tilt, np.zeros(n, np.bool_)), periods
 
 
 def _find_forward(
@@ -218,47 +221,47 @@ def _find_forward(
 ) -> tuple[Posture, list[WearPeriod]]:
     """Signed inclination in periods whose leans reveal the forward direction."""
     close, longest = round(NEAR_LYING_S * FRAME_HZ), round(params.upright.lean_s * FRAME_HZ)
-    beside = mark_near(lying, close, len(walking))
+    near_lying = mark_near(lying, close, len(walking))
     leans = [
         x
         for x in find_leans(posture.tilt, posture.known, params.transitions)
-        if not walking[x.top] and x.b - x.a <= longest and not beside[x.top]
+        if not walking[x.top] and x.b - x.a <= longest and not near_lying[x.top]
     ]
     lean, signed = posture.tilt.copy(), np.zeros(len(posture.tilt), np.bool_)
-    told = []
+    described = []
     for p in periods:
         a, b = (round(t * FRAME_HZ) - frames.first for t in (p.start_s, p.end_s))
         axis = _array(p.up)
         if axis is None:
-            told.append(p)
+            described.append(p)
             continue
         own: list[Lean] = [x for x in leans if a <= x.top < b]
-        at = [(x.a, x.top, x.b) for x in own]
-        forward, count = find_forward(frames.gravity, axis, at, params.upright)
-        told.append(describe_period(p.start_s, p.end_s, axis, forward, p.method, count))
+        lean_frames = [(x.a, x.top, x.b) for x in own]
+        forward, count = find_forward(frames.gravity, axis, lean_frames, params.upright)
+        described.append(describe_period(p.start_s, p.end_s, axis, forward, p.method, count))
         if forward is not None:
             for part in _cut_hours(a, b):
                 gravity = frames.gravity[part]
                 lean[part] = np.arctan2(-_along(gravity, forward), _along(gravity, axis))
             signed[a:b] = posture.known[a:b]
     lean[~posture.known] = 0.0
-    return Posture(posture.known, posture.tilt, lean, signed), told
+    return Posture(posture.known, posture.tilt, lean, signed), described
 
 
 def _seconds(frames: Frames, posture: Posture, day: Window) -> Floats:
     """Mean inclination (seconds,) in degrees for every second of the day, NaN if unknown."""
     a, b = (round(t * FRAME_HZ) - frames.first for t in day)
-    found = np.full(-(-(b - a) // FRAME_HZ), np.nan)
+    inclination = np.full(-(-(b - a) // FRAME_HZ), np.nan)
     for part in _cut_hours(a, b):
-        there = posture.signed[part]
-        firsts = np.arange(0, len(there), FRAME_HZ)
-        number = np.add.reduceat(there, firsts, dtype=np.int8)
-        total = np.add.reduceat(np.where(there, posture.lean[part], np.float32(0.0)), firsts)
+        mask = posture.signed[part]
+        firsts = np.arange(0, len(mask), FRAME_HZ)
+        number = np.add.reduceat(mask, firsts, dtype=np.int8)
+        total = np.add.reduceat(np.where(mask, posture.lean[part], np.float32(0.0)), firsts)
         second = (part.start - a) // FRAME_HZ
-        found[second : second + len(firsts)] = np.where(
+        inclination[second : second + len(firsts)] = np.where(
             number > 0, np.degrees(total / np.maximum(number, 1)), np.nan
         )
-    return found
+    return inclination
 
 
 def _cut_hours(a: int, b: int) -> Iterator[slice]:

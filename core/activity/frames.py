@@ -83,22 +83,22 @@ class FrameStore:
     def append(self, more: Frames) -> None:
         """Append consecutive frames; only the last ones of a recording may end within a minute."""
         end = self._count + len(more.valid)
-        for kept, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
-            kept[:] = new[: len(kept)]
+        for stored, new in zip(_list_columns(self._kept, self._count, end), _list_columns(more), strict=True):
+            stored[:] = new[: len(stored)]
         self._count = end
 
     def view(self, end: int) -> Frames:
         """Stored frames up to `end`; valid until the next `drop_before`."""
-        kept, n = self._kept, min(end, self.end) - self._first
+        stored, n = self._kept, min(end, self.end) - self._first
         minutes = -(-n // PER_MINUTE)
         return Frames(
             self._first,
-            kept.valid[:n],
-            kept.gravity[:n],
-            kept.up[:n],
-            kept.spread[:n],
-            kept.sd[:minutes],
-            kept.wobble[:minutes],
+            stored.valid[:n],
+            stored.gravity[:n],
+            stored.up[:n],
+            stored.spread[:n],
+            stored.sd[:minutes],
+            stored.wobble[:minutes],
         )
 
     def drop_before(self, first: int) -> None:
@@ -106,9 +106,9 @@ class FrameStore:
         cut = min(self._count, max(0, first - self._first))
         left = self._count - cut
         whole = -(-left // PER_MINUTE) * PER_MINUTE
-        to, of = _list_columns(self._kept, 0, left), _list_columns(self._kept, cut, cut + whole)
-        for kept, moved in zip(to, of, strict=True):
-            kept[:] = moved[: len(kept)]
+        to, source = _list_columns(self._kept, 0, left), _list_columns(self._kept, cut, cut + whole)
+        for target, moved in zip(to, source, strict=True):
+            target[:] = moved[: len(target)]
         self._first, self._count = self._first + cut, left
 
 

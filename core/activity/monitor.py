@@ -139,24 +139,24 @@ def _read_days(
     thigh = params.transitions.thigh_share * height_m
     parts: list[DayPart] = []
     end_s = 0.0
-    before: WearPeriod | None = None
+    previous: WearPeriod | None = None
     slabs = _tell_hours(reduce_stream(stream, segment, params), stream.duration_s, progress)
     for slab, day in _days(slabs, params):
-        part = read_day(slab, day, before, thigh, params)
+        part = read_day(slab, day, previous, thigh, params)
         parts.append(part)
-        before = next((p for p in reversed(part.periods) if p.up is not None), before)
+        previous = next((p for p in reversed(part.periods) if p.up is not None), previous)
         end_s = day[1]
     return parts, end_s
 
 
 def _tell_hours(slabs: Iterator[Slab], duration_s: float, progress: Progress) -> Iterator[Slab]:
     """Pass the slabs through, reporting `progress` after each full hour."""
-    told = 0.0
+    reported_s = 0.0
     for slab in slabs:
         end = (slab.frames.first + len(slab.frames.valid)) / FRAME_HZ
-        if end - told >= HOUR_S and duration_s > 0.0:
+        if end - reported_s >= HOUR_S and duration_s > 0.0:
             progress(min(1.0, end / duration_s))
-            told = end
+            reported_s = end
         yield slab
 
 
@@ -164,15 +164,15 @@ def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab,
     """Yield every day with its margins as one slab, together with its time range."""
     per_day, around = DAY_SLABS_S // params.slab_s, -(-AROUND_S // params.slab_s)
     per_slab = params.slab_s * FRAME_HZ
-    kept = FrameStore((per_day + 2 * around + 1) * per_slab)
+    store = FrameStore((per_day + 2 * around + 1) * per_slab)
     steps: list[float] = []
     turns: list[Turn] = []
     number = 0
 
     def look(until: int) -> tuple[Slab, Window]:
         """The current day with its margins."""
-        day = (number * DAY_SLABS_S, min(kept.end / FRAME_HZ, (number + 1) * DAY_SLABS_S))
-        frames, end_s = kept.view(until), until / FRAME_HZ
+        day = (number * DAY_SLABS_S, min(store.end / FRAME_HZ, (number + 1) * DAY_SLABS_S))
+        frames, end_s = store.view(until), until / FRAME_HZ
         return Slab(
             frames, tuple(t for t in steps if t < end_s), tuple(t for t in turns if t.start_s < end_s)
         ), day
@@ -182,20 +182,20 @@ def _days(slabs: Iterator[Slab], params: ActivityParams) -> Iterator[tuple[Slab,
         nonlocal number, steps, turns
         number += 1
         first = max(0, number * per_day - around) * per_slab
-        kept.drop_before(first)
+        store.drop_before(first)
         steps = [t for t in steps if t >= first / FRAME_HZ]
         turns = [t for t in turns if t.start_s >= first / FRAME_HZ]
 
     for slab in slabs:
-        kept.append(slab.frames)
+        store.append(slab.frames)
         steps += slab.steps_s
         turns += slab.turns
         until = ((number + 1) * per_day + around) * per_slab
         if slab.frames.first >= until:
             yield look(until)
             drop()
-    while number * DAY_SLABS_S < kept.end / FRAME_HZ:
-        yield look(kept.end)
+    while number * DAY_SLABS_S < store.end / FRAME_HZ:
+        yield look(store.end)
         drop()
 
 
@@ -213,17 +213,17 @@ def _put_together(
     kinds = np.concatenate([p.step_kinds for p in parts]) if parts else np.empty(0, int)
     far = np.diff(steps, prepend=-np.inf) > 0.5 * params.steps.step_s[0]
     steps, kinds = steps[far], kinds[far]
-    found = plain_bouts(steps.tolist(), params.bouts)
+    candidate_bouts = plain_bouts(steps.tolist(), params.bouts)
     walked = np.zeros(len(steps), np.bool_)
-    for w in found:
+    for w in candidate_bouts:
         walked[_within(steps, w.first_s, w.end_s)] = True
     steps, kinds = steps[walked], kinds[walked]
     transitions = [t for p in parts for t in p.transitions]
     candidates = [c for p in parts for c in p.candidates]
-    walks, transitions, refused = _meet(found, transitions)
+    walks, transitions, refused = _meet(candidate_bouts, transitions)
     candidates = sorted((*candidates, *refused), key=lambda c: c.time_s)
     fixed = _fix(parts, walks, steps, kinds)
-    spans, judged = decide_postures(
+    spans, checked = decide_postures(
         end_s,
         fixed,
         _merge_windows([w for p in parts for w in p.tilted]),
@@ -242,13 +242,13 @@ def _put_together(
         duration_s=end_s,
         height_m=height_m,
         spans=spans,
-        transitions=judged,
+        transitions=checked,
         candidates=tuple(candidates),
         bouts=bouts,
         steps_s=steps,
         turns=tuple(t for p in parts for t in p.turns),
         hours=sum_hours(end_s, stream.started_at, spans, steps),
-        days=sum_days(end_s, stream.started_at, spans, steps, bouts, judged),
+        days=sum_days(end_s, stream.started_at, spans, steps, bouts, checked),
         periods=tuple(x for p in parts for x in p.periods),
         inclination_deg=np.concatenate([p.inclination_deg for p in parts]) if parts else np.empty(0),
         notices=notices,
@@ -261,21 +261,21 @@ def _meet(
     """Start walking after rising and end it before sitting down; drop transitions in the middle of
     walking.
     """
-    kept, refused = [], []
+    retained, refused = [], []
     ranges = {i: [w.start_s, w.end_s] for i, w in enumerate(walks)}
     starts = np.array([w.start_s for w in walks])
     for t in transitions:
         i = int(np.searchsorted(starts, t.time_s, "right")) - 1
         if t.rise_m is None or i < 0 or t.time_s >= ranges[i][1]:
-            kept.append(t)
+            retained.append(t)
             continue
         a, b = ranges[i]
         if t.kind == "sit_to_stand" and t.time_s - a < min(3.0, 0.5 * (b - a)):
             ranges[i][0] = t.time_s
-            kept.append(t)
+            retained.append(t)
         elif t.kind == "stand_to_sit" and b - t.time_s < min(3.0, 0.5 * (b - a)):
             ranges[i][1] = t.time_s
-            kept.append(t)
+            retained.append(t)
         else:
             refused.append(
                 TransitionCandidate(
@@ -283,7 +283,7 @@ def _meet(
                 )
             )
     met = [replace(w, start_s=ranges[i][0], end_s=ranges[i][1]) for i, w in enumerate(walks)]
-    return met, kept, refused
+    return met, retained, refused
 
 
 def _fix(
@@ -306,22 +306,22 @@ def _fix(
 
 def _lay_by_rank(classes: Sequence[Sequence[FixedStretch]]) -> list[FixedStretch]:
     """Stretches in chronological order; of two that overlap, the one of the earlier class is kept."""
-    laid: list[FixedStretch] = []
+    placed: list[FixedStretch] = []
     for stretches in classes:
-        starts = [x.start_s for x in laid]
+        starts = [x.start_s for x in placed]
         free = []
         for x in stretches:
-            at = x.start_s
-            for taken in laid[max(0, bisect_right(starts, x.start_s) - 1) :]:
-                if taken.start_s >= x.end_s:
+            cursor_s = x.start_s
+            for occupied in placed[max(0, bisect_right(starts, x.start_s) - 1) :]:
+                if occupied.start_s >= x.end_s:
                     break
-                if taken.start_s > at:
-                    free.append(replace(x, start_s=at, end_s=taken.start_s))
-                at = max(at, taken.end_s)
-            if at < x.end_s:
-                free.append(replace(x, start_s=at))
-        laid = sorted((*laid, *free), key=lambda x: x.start_s)
-    return laid
+                if occupied.start_s > cursor_s:
+                    free.append(replace(x, start_s=cursor_s, end_s=occupied.start_s))
+                cursor_s = max(cursor_s, occupied.end_s)
+            if cursor_s < x.end_s:
+                free.append(replace(x, start_s=cursor_s))
+        placed = sorted((*placed, *free), key=lambda x: x.start_s)
+    return placed
 
 
 def _cut_stairs(walk: Bout, steps: Floats, kinds: np.ndarray) -> list[FixedStretch]:
@@ -371,9 +371,9 @@ def _merge_windows(windows: Sequence[Window]) -> list[Window]:
 
 def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -> tuple[Notice, ...]:
     """Notices for the reader."""
-    told = list(stream.notices)
+    messages = list(stream.notices)
     if height_m is None:
-        told.append(
+        messages.append(
             Notice(
                 "height_assumed",
                 Message(
@@ -386,7 +386,7 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
         )
     periods = [p for part in parts for p in part.periods]
     if periods and all(p.method == "none" for p in periods):
-        told.append(
+        messages.append(
             Notice(
                 "no_baseline",
                 "No walking and no still period of 5 s detected, so the vertical is unknown. Postures are "
@@ -395,7 +395,7 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
             )
         )
     elif any(p.method == "first_rest" for p in periods):
-        told.append(
+        messages.append(
             Notice(
                 "baseline_assumed",
                 "No walking detected, so the first 5 s of rest are assumed to be upright. If the person was "
@@ -404,7 +404,7 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
             )
         )
     if any(p.up is not None and p.forward is None for p in periods):
-        told.append(
+        messages.append(
             Notice(
                 "forward_unknown",
                 "During part of the wear time no trunk lean showed the forward direction; inclination has no "
@@ -413,4 +413,4 @@ def _say(stream: LongStream, height_m: float | None, parts: Sequence[DayPart]) -
                 severity="info",
             )
         )
-    return tuple(told)
+    return tuple(messages)

@@ -18,11 +18,11 @@ WORN_H: Final = 10.0
 """A day counts when the sensor was worn for so long: customary for accelerometers [our choice]."""
 
 
-def measure_day(found: ActivityResult) -> tuple[Parameter, ...]:
+def measure_day(activity: ActivityResult) -> tuple[Parameter, ...]:
     """Steps, times and transitions per day; without a day of sufficient wear time the reason is
     `no_whole_day`.
     """
-    days = [d for d in found.days if d.worn_h >= WORN_H]
+    days = [d for d in activity.days if d.worn_h >= WORN_H]
     values = _measure(days)
     return tuple(
         summarise_values(name, None, values[name], unit_of(name), "no_whole_day") for name in MEASURES

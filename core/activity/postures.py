@@ -70,7 +70,7 @@ def decide_postures(
     candidates : only those rejected for too small a lean or for being close to lying are used.
     """
     spans: list[ActivitySpan] = []
-    judged: list[PosturalTransition] = []
+    checked: list[PosturalTransition] = []
     upright = [t for t in transitions if t.kind in AFTER]
     times = [t.time_s for t in upright]
     settling = [c for c in candidates if c.refused in ("lean_below_limit", "near_lying")]
@@ -81,10 +81,10 @@ def decide_postures(
         if left is not None:
             spans.append(_span(left.start_s, left.end_s, left.kind, left.evidence))
         inside = upright[bisect_left(times, start) : bisect_right(times, end)] if end > start else []
-        spans += _fill(start, end, left, right, inside, settling, longest_stand_s, judged)
+        spans += _fill(start, end, left, right, inside, settling, longest_stand_s, checked)
     lying = [t for t in transitions if t.kind not in AFTER]
-    told = tuple(sorted((*judged, *lying), key=lambda t: t.time_s))
-    return tuple(_merge(_overlay(spans, tilted))), told
+    all_transitions = tuple(sorted((*checked, *lying), key=lambda t: t.time_s))
+    return tuple(_merge(_overlay(spans, tilted))), all_transitions
 
 
 def _fill(
@@ -95,13 +95,13 @@ def _fill(
     inside: Sequence[PosturalTransition],
     settling: Sequence[TransitionCandidate],
     longest_stand_s: float,
-    judged: list[PosturalTransition],
+    checked: list[PosturalTransition],
 ) -> list[ActivitySpan]:
     """Spans between two certain stretches, given the transitions in between, which are appended to
-    `judged`.
+    `checked`.
     """
     if end <= start:
-        judged += inside
+        checked += inside
         return []
     spans: list[ActivitySpan] = []
     marks = [start, *(t.time_s for t in inside), end]
@@ -118,17 +118,17 @@ def _fill(
         elif first == last:
             spans.append(_stand(a, b, first, "both_ends", longest_stand_s))
         else:
-            wanted = "sit_to_stand" if last == "standing" else "stand_to_sit"
-            between = [c for c in settling if a < c.time_s < b and c.likely == wanted]
-            if between:
-                t = max(between, key=lambda c: abs(c.rise_m)).time_s
+            expected = "sit_to_stand" if last == "standing" else "stand_to_sit"
+            matching = [c for c in settling if a < c.time_s < b and c.likely == expected]
+            if matching:
+                t = max(matching, key=lambda c: abs(c.rise_m)).time_s
                 spans.append(_stand(a, t, first, "sub_threshold", longest_stand_s))
                 spans.append(_stand(t, b, last, "sub_threshold", longest_stand_s))
             else:
                 consistent = False
                 spans.append(_span(a, b, "unknown", "contradiction"))
         if k < len(inside):
-            judged.append(inside[k] if consistent else replace(inside[k], consistent=False))
+            checked.append(inside[k] if consistent else replace(inside[k], consistent=False))
     return [s for s in spans if s.end_s > s.start_s]
 
 
@@ -152,18 +152,18 @@ def _overlay(spans: Sequence[ActivitySpan], tilted: Sequence[Window]) -> list[Ac
     out: list[ActivitySpan] = []
     ends = [w[1] for w in tilted]
     for span in spans:
-        at = span.start_s
+        cursor_s = span.start_s
         if span.kind in ("sitting", "standing", "walking"):
             for w in tilted[bisect_right(ends, span.start_s) :]:
                 if w[0] >= span.end_s:
                     break
-                a, b = max(at, w[0]), min(span.end_s, w[1])
-                if a > at:
-                    out.append(replace(span, start_s=at, end_s=a))
+                a, b = max(cursor_s, w[0]), min(span.end_s, w[1])
+                if a > cursor_s:
+                    out.append(replace(span, start_s=cursor_s, end_s=a))
                 out.append(_span(a, b, "unknown", "brief_tilt"))
-                at = b
-        if span.end_s > at:
-            out.append(replace(span, start_s=at))
+                cursor_s = b
+        if span.end_s > cursor_s:
+            out.append(replace(span, start_s=cursor_s))
     return out
 
 

@@ -111,20 +111,20 @@ class _PointStore:
 
     def append(self, more: _Window) -> None:
         part = slice(self._count, self._count + len(more.valid))
-        kept = self._points
-        kept.acc[part], kept.gyr[part], kept.valid[part] = more.acc, more.gyr, more.valid
+        stored = self._points
+        stored.acc[part], stored.gyr[part], stored.valid[part] = more.acc, more.gyr, more.valid
         self._count = part.stop
 
     def view(self, end: int) -> _Window:
-        part, kept = slice(0, end - self._first), self._points
-        return _Window(self._first, kept.acc[part], kept.gyr[part], kept.valid[part])
+        part, stored = slice(0, end - self._first), self._points
+        return _Window(self._first, stored.acc[part], stored.gyr[part], stored.valid[part])
 
     def drop_before(self, first: int) -> None:
-        cut, kept = max(0, first - self._first), self._points
+        cut, stored = max(0, first - self._first), self._points
         left = self._count - cut
-        kept.acc[:left] = kept.acc[cut : self._count]
-        kept.gyr[:left] = kept.gyr[cut : self._count]
-        kept.valid[:left] = kept.valid[cut : self._count]
+        stored.acc[:left] = stored.acc[cut : self._count]
+        stored.gyr[:left] = stored.gyr[cut : self._count]
+        stored.valid[:left] = stored.valid[cut : self._count]
         self._first, self._count = self._first + cut, left
 
 
@@ -133,8 +133,8 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
 
     The points of a piece depend on the last sample before it, those in it, and the first one after it.
     """
-    kept: list[SampleBlock] = []
-    first, last_s, seen = 0, -np.inf, False
+    pending: list[SampleBlock] = []
+    first, last_s, has_data = 0, -np.inf, False
     size = PIECE_S * rate
     end = size
     for raw in stream.open_blocks():
@@ -153,16 +153,16 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
                 ),
                 sensor=stream.device_id,
             )
-        seen, last_s = True, float(block.t_s[-1])
-        kept.append(block)
+        has_data, last_s = True, float(block.t_s[-1])
+        pending.append(block)
         while last_s > (end + 1) / rate:
-            rows = _join(kept)
+            rows = _join(pending)
             yield _lay(rows, first, end, rate, stream)
             # the last sample at or before the next point stays
             cut = max(0, int(np.searchsorted(rows.t_s, end / rate, "right")) - 1)
-            kept = [_take(rows, slice(cut, None))]
+            pending = [_take(rows, slice(cut, None))]
             first, end = end, end + size
-    if not seen:
+    if not has_data:
         raise SignalError(
             "bad_signal",
             Message("“{source}” has no complete sample; export it again.", source=stream.source),
@@ -170,7 +170,7 @@ def _lay_pieces(stream: LongStream, rate: int) -> Iterator[_Window]:
         )
     until = floor(last_s * rate + 0.01) + 1
     if until > first:
-        yield _lay(_join(kept), first, until, rate, stream)
+        yield _lay(_join(pending), first, until, rate, stream)
 
 
 def _lay(rows: SampleBlock, first: int, end: int, rate: int, stream: LongStream) -> _Window:
@@ -179,18 +179,20 @@ def _lay(rows: SampleBlock, first: int, end: int, rate: int, stream: LongStream)
     channels = rows.acc[:upto]
     if rows.gyr is not None:
         channels = np.concatenate((channels, rows.gyr[:upto]), axis=1)
-    laid, valid, _ = lay_signal(
+    resampled, valid, _ = lay_signal(
         rows.t_s[:upto], channels, first / rate, end - first, stream.rate_hz, float(rate), TimelineParams()
     )
-    return _Window(first, laid[0], laid[1] if len(laid) > 1 else np.zeros_like(laid[0]), valid)
+    return _Window(
+        first, resampled[0], resampled[1] if len(resampled) > 1 else np.zeros_like(resampled[0]), valid
+    )
 
 
 def _in_order(block: SampleBlock, after_s: float) -> SampleBlock:
     """Rows with a time later than all previous ones."""
     if not len(block.t_s):
         return block
-    before = np.maximum.accumulate(np.concatenate(([after_s], block.t_s[:-1])))
-    rising = block.t_s > before
+    latest_s = np.maximum.accumulate(np.concatenate(([after_s], block.t_s[:-1])))
+    rising = block.t_s > latest_s
     return block if rising.all() else _take(block, rising)
 
 
@@ -245,7 +247,7 @@ def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams
         gravity = size[:, None] * follow_up(window.acc, window.gyr, gravity / size[:, None], rate)
     up = np.einsum("ni,ni->n", window.acc, gravity) / size
     norm = np.sqrt(np.einsum("ni,ni->n", window.acc, window.acc))
-    away = norm - uniform_filter1d(norm, rate, mode="nearest")
+    deviation = norm - uniform_filter1d(norm, rate, mode="nearest")
 
     def mean(x: Floats) -> Singles:
         return np.asarray(_cut(x[core], per).mean(axis=1), np.float32)
@@ -253,7 +255,7 @@ def _make_frames(window: _Window, core: slice, rate: int, params: ActivityParams
     sd, wobble = _measure_minutes(window.acc[core], window.valid[core], rate)
     whole = np.asarray(_cut(window.valid[core], per).all(axis=1))
     first = (window.first + core.start) // per
-    return Frames(first, whole, mean(gravity), mean(up), mean(away**2), sd, wobble), moving
+    return Frames(first, whole, mean(gravity), mean(up), mean(deviation**2), sd, wobble), moving
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -322,12 +324,12 @@ def _measure_minutes(acc: Floats, valid: Bools, rate: int) -> tuple[Singles, Sin
     minute = 60 * rate
     sd, wobble = [], []
     for i in range(0, len(acc), minute):
-        part, there = acc[i : i + minute], valid[i : i + minute]
-        if np.count_nonzero(there) < 0.5 * minute:
+        part, is_valid = acc[i : i + minute], valid[i : i + minute]
+        if np.count_nonzero(is_valid) < 0.5 * minute:
             sd.append(np.full(3, np.nan))
             wobble.append(np.full(3, np.nan))
             continue
-        sd.append(part[there].std(axis=0))
+        sd.append(part[is_valid].std(axis=0))
         wobble.append(_cut(part, rate).mean(axis=1).std(axis=0))
     return np.array(sd, np.float32).reshape(-1, 3), np.array(wobble, np.float32).reshape(-1, 3)
 
@@ -343,11 +345,11 @@ def _find_steps_and_turns(
         part = slice(max(0, a - round(EDGE_S * rate)), min(len(moving), b + round(EDGE_S * rate)))
         offset = (window.first + part.start) / rate
         thin = rate // STEP_RATE if rate % STEP_RATE == 0 else 1
-        alone = _take_alone(_cut_out(signals, part), rate, thin, segment)
-        found = find_step_times(alone, segment, params.steps)
+        acc_only = _take_alone(_cut_out(signals, part), rate, thin, segment)
+        step_times = find_step_times(acc_only, segment, params.steps)
         centre = offset + 0.5 * (thin - 1) / rate
-        steps += [t + centre for t in found]
-        if found and window.gyr.any():
+        steps += [t + centre for t in step_times]
+        if step_times and window.gyr.any():
             whole = _cut_out(signals, part)
             _, yaw_rate = split_about_vertical(whole, rate, params.steps)
             turns += [
@@ -383,8 +385,8 @@ def _take_alone(signals: SensorSignals, rate: int, thin: int, segment: Segment) 
     """
     acc = np.asarray(_cut(signals.acc, thin).mean(axis=1))
     valid = np.asarray(_cut(signals.valid, thin).all(axis=1), np.bool_)
-    alone = SensorSignals("", acc, np.zeros_like(acc), None, valid, ~valid)
+    acc_only = SensorSignals("", acc, np.zeros_like(acc), None, valid, ~valid)
     t_s = np.arange(len(acc), dtype=np.float64) * (thin / rate)
     return UniformRecording(
-        np.asarray(t_s, np.float64), rate / thin, {segment: alone}, Subject(), "activity", {}
+        np.asarray(t_s, np.float64), rate / thin, {segment: acc_only}, Subject(), "activity", {}
     )

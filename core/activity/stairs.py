@@ -30,13 +30,13 @@ KIND_OF: tuple[StepKind, ...] = ("walking", "stairs_up", "stairs_down")
 
 
 def measure_walking(
-    theta: Singles, walking: Bools, at: Sequence[int], params: StairParams
+    theta: Singles, walking: Bools, step_frames: Sequence[int], params: StairParams
 ) -> tuple[Floats, Floats]:
     """Standard deviation and mean of the inclination, rad, around the given frames.
 
     Parameters
     ----------
-    theta : (f,) signed inclination. walking : (f,) in a bout. at : frames of steps.
+    theta : (f,) signed inclination. walking : (f,) in a bout. step_frames : frames of steps.
 
     Returns
     -------
@@ -45,12 +45,12 @@ def measure_walking(
     from scipy.ndimage import uniform_filter1d
 
     half, edge = round(0.5 * params.window_s * FRAME_HZ), round(EDGE_S * FRAME_HZ)
-    rocks, lean = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    rocks, lean = np.full(len(step_frames), np.nan), np.full(len(step_frames), np.nan)
     runs = find_runs(walking)
     # a second holds two steps: what bounces with each is gone
     smooth = [uniform_filter1d(theta[a:b], FRAME_HZ, mode="nearest") for a, b in runs]
     starts = [a for a, _ in runs]
-    for k, i in enumerate(at):
+    for k, i in enumerate(step_frames):
         r = bisect_right(starts, i) - 1
         if r < 0 or i > runs[r][1]:
             continue

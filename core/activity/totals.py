@@ -91,9 +91,9 @@ def _minutes(edges: Sequence[float], spans: Sequence[ActivitySpan]) -> list[dict
     for span in spans:
         while i + 1 < len(sums) and edges[i + 1] <= span.start_s:
             i += 1
-        k, at = i, span.start_s
-        while at < span.end_s:
+        k, cursor_s = i, span.start_s
+        while cursor_s < span.end_s:
             upto = span.end_s if k + 1 == len(sums) else min(span.end_s, edges[k + 1])
-            sums[k][span.kind] += (upto - at) / 60.0
-            at, k = upto, k + 1
+            sums[k][span.kind] += (upto - cursor_s) / 60.0
+            cursor_s, k = upto, k + 1
     return sums

@@ -58,28 +58,28 @@ class Lean:
     rad: float
 
 
-def find_lying(tilt: Singles, frames: Frames, there: Bools, params: TransitionParams) -> list[Lying]:
+def find_lying(tilt: Singles, frames: Frames, is_known: Bools, params: TransitionParams) -> list[Lying]:
     """Periods with an inclination above the lying limit.
 
     Parameters
     ----------
-    tilt : (f,) inclination in any direction, rad. there : (f,) sensor worn and upright direction known.
+    tilt : (f,) inclination in any direction, rad. is_known : (f,) sensor worn and upright direction known.
     """
     joined: list[tuple[int, int]] = []
-    for a, b in find_runs((tilt > params.lying_rad) & there):
-        between = slice(joined[-1][1], a) if joined else slice(0, 0)
+    for a, b in find_runs((tilt > params.lying_rad) & is_known):
+        gap = slice(joined[-1][1], a) if joined else slice(0, 0)
         if (
             joined
             and a - joined[-1][1] < JOIN_LYING_S * FRAME_HZ
-            and tilt[between].min() > JOIN_LYING_RAD
-            and there[between].all()
+            and tilt[gap].min() > JOIN_LYING_RAD
+            and is_known[gap].all()
         ):
             joined[-1] = (joined[-1][0], b)
         else:
             joined.append((a, b))
     calm = frames.spread < params.still**2
     length = round(params.still_s * FRAME_HZ)
-    found = []
+    periods = []
     for a, b in joined:
         still = b - a >= params.shortest_lie_s * FRAME_HZ and any(
             y - x >= length for x, y in find_runs(calm[a:b])
@@ -87,11 +87,11 @@ def find_lying(tilt: Singles, frames: Frames, there: Bools, params: TransitionPa
         if still:
             half = 0.5 * float(np.median(tilt[a:b]))
             a -= _count_above(
-                tilt[max(0, a - HALF_WAY) : a][::-1], there[max(0, a - HALF_WAY) : a][::-1], half
+                tilt[max(0, a - HALF_WAY) : a][::-1], is_known[max(0, a - HALF_WAY) : a][::-1], half
             )
-            b += _count_above(tilt[b : b + HALF_WAY], there[b : b + HALF_WAY], half)
-        found.append(Lying(a, b, still))
-    return found
+            b += _count_above(tilt[b : b + HALF_WAY], is_known[b : b + HALF_WAY], half)
+        periods.append(Lying(a, b, still))
+    return periods
 
 
 def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
@@ -102,23 +102,23 @@ def mark_near(lying: Sequence[Lying], close: int, n: int) -> Bools:
     return mask
 
 
-def _count_above(tilt: Singles, there: Bools, limit: float) -> int:
+def _count_above(tilt: Singles, is_known: Bools, limit: float) -> int:
     """Number of frames, from the first one, that stay above a limit."""
-    over = (tilt > limit) & there
+    over = (tilt > limit) & is_known
     return len(over) if over.all() else int(np.argmin(over))
 
 
-def find_leans(theta: Singles, there: Bools, params: TransitionParams) -> list[Lean]:
+def find_leans(theta: Singles, is_known: Bools, params: TransitionParams) -> list[Lean]:
     """Peaks of the inclination (f,) as candidate leans, each with the adjacent minima."""
     least = 0.5 * params.prominence_rad
     foot = max(0.0, params.candidate_rad - least)
     tops: list[int] = []
     # a peak stands out enough above all that lies at the foot: what lies beyond changes nothing
-    for first, last in find_runs(there & (theta > foot)):
+    for first, last in find_runs(is_known & (theta > foot)):
         part = slice(max(0, first - 1), last + 1)
-        rising = np.where(there[part], theta[part], 0.0)
-        found = find_peaks(rising, height=params.candidate_rad, prominence=least)
-        tops += (part.start + found).tolist()
+        rising = np.where(is_known[part], theta[part], 0.0)
+        peaks = find_peaks(rising, height=params.candidate_rad, prominence=least)
+        tops += (part.start + peaks).tolist()
     reach = round(params.half_s * FRAME_HZ)
     return [
         Lean(
@@ -193,10 +193,10 @@ def judge_leans(
     params: TransitionParams,
 ) -> tuple[list[PosturalTransition], list[TransitionCandidate]]:
     """Classify leans as rising or sitting down; of the others keep those worth reporting as candidates."""
-    found: list[PosturalTransition] = []
+    transitions: list[PosturalTransition] = []
     refused: list[TransitionCandidate] = []
     close = round(params.near_lying_s * FRAME_HZ)
-    beside = mark_near(lying, close, len(frames.valid))
+    near_lying = mark_near(lying, close, len(frames.valid))
     for lean in leans:
         first, last = find_calm_ends(lean, frames, params)
         part = slice(first, last + 1)
@@ -206,7 +206,7 @@ def judge_leans(
         rise = measure_rise(frames.up[part].astype(np.float64))
         direction = tell_direction(measure_length(frames.gravity[part]))
         likely: TransitionKind = "sit_to_stand" if rise > 0.0 else "stand_to_sit"
-        near = bool(beside[lean.top])
+        near = bool(near_lying[lean.top])
         prominent = lean.rad - max(theta[lean.a], theta[lean.b]) >= params.prominence_rad
         # from upright, or from how the person sat where that is further back
         far = lean.rad - min(0.0, theta[lean.a], theta[lean.b])
@@ -227,25 +227,25 @@ def judge_leans(
         if lean.rad >= params.lying_rad or (reason == "chest_did_not_rise" and not large):
             continue
         if reason is None:
-            found.append(PosturalTransition(likely, time, start, end, degrees(far), rise))
+            transitions.append(PosturalTransition(likely, time, start, end, degrees(far), rise))
         else:
             named = None if reason in ("chest_did_not_rise", "direction_unclear") else likely
             refused.append(TransitionCandidate(time, start, end, degrees(far), rise, reason, named))
-    return found, refused
+    return transitions, refused
 
 
 def tell_lying(lying: Sequence[Lying], frames: Frames, tilt: Singles) -> list[PosturalTransition]:
     """Lying down and getting up at the ends of a lying period, with the direction of the tilt."""
-    found = []
+    transitions = []
     n = len(frames.valid)
     for x in lying:
         if not x.still:
             continue
         ends: tuple[tuple[TransitionKind, int], ...] = (("sit_to_lie", x.a), ("lie_to_sit", x.b))
         for kind, i in ends:
-            known = 0 < i < n and bool(frames.valid[max(0, i - 1) : i + 1].all())
-            if known:
+            measured = 0 < i < n and bool(frames.valid[max(0, i - 1) : i + 1].all())
+            if measured:
                 time = (frames.first + i) / FRAME_HZ
                 most = float(tilt[x.a : x.b].max())
-                found.append(PosturalTransition(kind, time, time, time, degrees(most), None))
-    return found
+                transitions.append(PosturalTransition(kind, time, time, time, degrees(most), None))
+    return transitions

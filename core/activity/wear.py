@@ -48,10 +48,10 @@ def find_wear(frames: Frames, params: WearParams) -> Wear:
     for a, b in gaps:
         quiet[a:b] = False
     off = tuple(find_runs(quiet))
-    taken = quiet
+    non_wear = quiet
     for a, b in gaps:
-        taken[a:b] = True
-    return Wear(gaps, off, tuple(find_runs(~taken)))
+        non_wear[a:b] = True
+    return Wear(gaps, off, tuple(find_runs(~non_wear)))
 
 
 def _count_while(mask: Bools) -> int:
@@ -80,10 +80,10 @@ def find_upright(
         return _middle(frames.gravity[part][walks]), "walking"
     length = round(params.still_s * FRAME_HZ)
     still = frames.valid[part] & (frames.spread[part] < params.still**2)
-    rest = next(((a, b) for a, b in find_runs(still) if b - a >= length), None)
-    if rest is None:
+    still_run = next(((a, b) for a, b in find_runs(still) if b - a >= length), None)
+    if still_run is None:
         return None, "none"
-    first = period[0] + rest[0]
+    first = period[0] + still_run[0]
     return _middle(frames.gravity[first : first + length]), "first_rest"
 
 
@@ -94,17 +94,17 @@ def _middle(gravity: Singles) -> Floats:
 
 
 def find_forward(
-    gravity: Singles, up: Floats, at: Sequence[tuple[int, int, int]], params: UprightParams
+    gravity: Singles, up: Floats, lean_frames: Sequence[tuple[int, int, int]], params: UprightParams
 ) -> tuple[Floats | None, int]:
     """Unit axis (3,) of the sensor that points forward, perpendicular to up, and the number of leans it is
     based on.
 
     Parameters
     ----------
-    gravity : (f, 3). at : first, peak and last frame of every brief lean.
+    gravity : (f, 3). lean_frames : first, peak and last frame of every brief lean.
     """
     directions = []
-    for a, top, b in at:
+    for a, top, b in lean_frames:
         unit = gravity[[a, top, b]] / measure_length(gravity[[a, top, b]])[:, None]
         lean = unit[1] - 0.5 * (unit[0] + unit[2])
         lean = lean - (lean @ up) * up

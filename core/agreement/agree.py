@@ -66,7 +66,7 @@ Terms = Mapping[Segment, SensorTerms]
 def compare_sensors(
     recording: UniformRecording,
     params: JointParams,
-    known: Terms | None = None,
+    known_terms: Terms | None = None,
     unchanged: Iterable[JointWindows] = (),
     over_s: float = np.inf,
 ) -> tuple[tuple[JointWindows, ...], Terms]:
@@ -74,28 +74,28 @@ def compare_sensors(
 
     Parameters
     ----------
-    known : terms of unchanged sensors. unchanged : windows of joints with two unchanged sensors.
+    known_terms : terms of unchanged sensors. unchanged : windows of joints with two unchanged sensors.
     over_s : terms are kept for this time from the first window on, for `find_exchange`; other terms are held
         only as long as the joints require them.
     """
-    worn = drop_stuck_sensors(recording)
-    joints = list_worn_joints(worn.sensors)
-    known, done = known or {}, {(w.first, w.second): w for w in unchanged}
-    order = (*known, *sorted({s for joint in joints for s in joint} - set(known)))
-    terms, found = dict(known), []
+    working = drop_stuck_sensors(recording)
+    joints = list_worn_joints(working.sensors)
+    known_terms, done = known_terms or {}, {(w.first, w.second): w for w in unchanged}
+    order = (*known_terms, *sorted({s for joint in joints for s in joint} - set(known_terms)))
+    terms, windows = dict(known_terms), []
     start = np.inf
     for i, joint in enumerate(joints):
         if joint not in done:
             for s in joint:
                 if s not in terms or not terms[s].is_whole:
-                    terms[s] = find_terms(worn.sensors[s], worn.rate_hz, params)
+                    terms[s] = find_terms(working.sensors[s], working.rate_hz, params)
             done[joint] = compare_at_joint(joint, terms[joint[0]], terms[joint[1]], params)
-        found.append(done[joint])
+        windows.append(done[joint])
         start = min(start, done[joint].start_s)
-        wanted = {s for later in joints[i + 1 :] if later not in done for s in later}
-        for s in terms.keys() - wanted:
+        needed = {s for later in joints[i + 1 :] if later not in done for s in later}
+        for s in terms.keys() - needed:
             terms[s] = terms[s].keep_first(start + over_s)
-    return tuple(found), {s: terms[s].keep_first(start + over_s) for s in order}
+    return tuple(windows), {s: terms[s].keep_first(start + over_s) for s in order}
 
 
 def check_agreement(
@@ -112,36 +112,36 @@ def check_agreement(
     params, timeline = params or AgreementParams(), timeline or TimelineParams()
     over_s = params.exchange.over_s
     joints, terms = compare_sensors(recording, params.joints, over_s=over_s)
-    said: list[Notice] = []
+    new_notices: list[Notice] = []
     if not joints:
-        return _repair_slips(Agreement(recording), joints, terms, params.slips, said)
+        return _repair_slips(Agreement(recording), joints, terms, params.slips, new_notices)
     exchange = find_exchange(terms, joints, recording.rate_hz, params.joints, params.exchange)
     current = recording
     if exchange.mixed_up or exchange.mirrored:
         # what else the joints seem to say follows from that
         return Agreement(recording, exchange=exchange, misfits=measure_misfits(joints))
     if exchange.swap:
-        said.append(tell_exchange(exchange, params.exchange))
+        new_notices.append(tell_exchange(exchange, params.exchange))
         if params.exchange.repair:
             current = replace(current, sensors=undo_exchange(exchange.swap, current.sensors))
-            known = undo_exchange(exchange.swap, terms)
-            joints, terms = compare_sensors(current, params.joints, known, over_s=over_s)
+            relabelled = undo_exchange(exchange.swap, terms)
+            joints, terms = compare_sensors(current, params.joints, relabelled, over_s=over_s)
     clocks = list_judged(joints, params.lags)
     lags, drifts = find_sensor_lags(joints, params.lags), find_drifts(joints, params.lags)
-    said += [tell_lag(x, params.lags) for x in lags if x.told]
-    said += [tell_drift(x, params.lags) for x in drifts]
+    new_notices += [tell_lag(x, params.lags) for x in lags if x.told]
+    new_notices += [tell_drift(x, params.lags) for x in drifts]
     late = _lags_over_time(current.t_s, lags, drifts) if params.lags.repair else {}
     if late:
         current = _take_lags_out(current, late, timeline)
-        kept = {s: x for s, x in terms.items() if s not in late}
+        unchanged = {s: x for s, x in terms.items() if s not in late}
         same = [w for w in joints if not {w.first, w.second} & set(late)]
-        joints, terms = compare_sensors(current, params.joints, kept, same, over_s)
-        said += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
+        joints, terms = compare_sensors(current, params.joints, unchanged, same, over_s)
+        new_notices += [tell_left_over(x) for x in find_sensor_lags(joints, params.lags) if x.told]
     shifted = {s: float(x[len(x) // 2]) for s, x in late.items()}
     reached = Agreement(
         current, None, exchange, lags, drifts, (), shifted, {}, clocks, {}, measure_misfits(joints)
     )
-    return _repair_slips(reached, joints, terms, params.slips, said)
+    return _repair_slips(reached, joints, terms, params.slips, new_notices)
 
 
 def _repair_slips(
@@ -149,21 +149,21 @@ def _repair_slips(
     joints: Sequence[JointWindows],
     terms: Terms,
     params: SlipParams,
-    said: list[Notice],
+    new_notices: list[Notice],
 ) -> Agreement:
-    """Find slipped sensors, turn back what they showed or leave it out; `said` is told with them."""
+    """Find slipped sensors; correct or exclude them, and add `new_notices` to the recording."""
     current = reached.recording
     slips, places = _find_all_slips(current, terms, joints, params)
     by_strides, seen, slow = find_stride_slips(drop_stuck_sensors(current), {x.segment for x in slips})
     slips += by_strides
     places = {**seen, **places}
-    said += [tell_slip(x, params) for x in slips]
-    said += slow
+    new_notices += [tell_slip(x, params) for x in slips]
+    new_notices += slow
     back = {x.segment: x for x in slips if x.is_repaired and params.repair}
     turned = {s: turn_back(current.sensors[s], current.t_s, x) for s, x in back.items()}
     doubtful = {x.segment: _find_doubt(x, x.segment in back) for x in slips}
-    if said:
-        notices = tuple(dict.fromkeys((*current.notices, *said)))
+    if new_notices:
+        notices = tuple(dict.fromkeys((*current.notices, *new_notices)))
         current = replace(current, sensors={**current.sensors, **turned}, notices=notices)
     out = {s: x for s, x in doubtful.items() if params.repair and s not in back}
     left = {s: leave_out(current.sensors[s], current.t_s, x) for s, x in out.items()}
@@ -188,12 +188,12 @@ def _find_all_slips(
 ) -> tuple[tuple[SensorSlip, ...], dict[Segment, Window]]:
     """Slips while walking and between two standing periods, in the form of `find_slips`."""
     slips, places = find_slips(recording, terms, joints, params)
-    before, stayed = compare_standings(recording, terms, params)
+    standing_slips, stayed = compare_standings(recording, terms, params)
     # a joint near the edge of a walk may blame its other sensor, which both standings then clear
-    legs = {x.segment[-1] for x in before}
+    legs = {x.segment[-1] for x in standing_slips}
     slips = tuple(x for x in slips if x.segment[-1] not in legs or x.segment not in stayed)
     slips = tuple(x for x in slips if not deny_slip(recording, x))
-    slips += tuple(x for x in before if x.segment not in {slip.segment for slip in slips})
+    slips += tuple(x for x in standing_slips if x.segment not in {slip.segment for slip in slips})
     places |= {s: x for s, x in stayed.items() if s not in places or _length(x) > _length(places[s])}
     return slips, places
 

@@ -102,15 +102,15 @@ def find_exchange(
     rates = {s: float(np.sqrt((x.motion.rate**2).sum(axis=1).mean())) for s, x in part.items()}
     order = sort_by_joints(misfits, rates, params.calmest)
     mirrored, gain = find_mirrored(part, misfits, list_worn_joints(part), joint_params, params)
-    others = max(len(joints) * float(np.log(max(ratio, 1.0))), 0.0 if order is None else order.gain)
-    if mirrored and gain > others + np.log(params.mirrored):
+    alternative_gain = max(len(joints) * float(np.log(max(ratio, 1.0))), 0.0 if order is None else order.gain)
+    if mirrored and gain > alternative_gain + np.log(params.mirrored):
         return SensorExchange((), float(np.exp(gain / len(joints))), None, mirrored=mirrored)
     if order is not None and order.is_clear(_score(misfits, swap), params.ratio, params.distinct):
         moved = {s: part[x] for s, x in order.stated_for.items()}
         cosine = _compare_hips_of(moved, rate_hz, joint_params, params)
         sure = cosine is not None and abs(cosine) > -params.cosine
-        found = order.exchange_legs() if cosine is not None and cosine < 0.0 else order.stated_for
-        return SensorExchange((), order.stated / order.misfit, cosine, found if sure else {})
+        best_labels = order.exchange_legs() if cosine is not None and cosine < 0.0 else order.stated_for
+        return SensorExchange((), order.stated / order.misfit, cosine, best_labels if sure else {})
     cosine = _compare_hips_of(undo_exchange(swap, part), rate_hz, joint_params, params)
     return judge_legs(swap, ratio, cosine, params)
 
@@ -134,9 +134,9 @@ def choose_labels(
     compared : sensor pairs for every joint under every labelling of `SWAPS`, by declared label.
     """
     misfits = _misfits(compared)
-    worn = frozenset().union(*compared)
+    segments = frozenset().union(*compared)
     stated = _score(misfits, ())
-    possible = [x for x in SWAPS if all(s in worn for pair in x for s in pair)]
+    possible = [x for x in SWAPS if all(s in segments for pair in x for s in pair)]
     scores = {x: _score(misfits, x) for x in possible}
     best = min(scores, key=lambda x: scores[x], default=())
     ratio = stated / scores[best] if best else 0.0
@@ -177,15 +177,15 @@ def _score(misfits: Mapping[frozenset[Segment], float], swap: Swap) -> float:
     name = {s: s for joint in LEG_JOINTS for s in joint}
     for a, b in swap:
         name[a], name[b] = b, a
-    found = [misfits.get(frozenset((name[a], name[b]))) for a, b in LEG_JOINTS]
-    said = [x for x in found if x is not None]
-    return float(np.exp(np.mean(np.log(said)))) if said else np.inf
+    joint_misfits = [misfits.get(frozenset((name[a], name[b]))) for a, b in LEG_JOINTS]
+    available = [x for x in joint_misfits if x is not None]
+    return float(np.exp(np.mean(np.log(available)))) if available else np.inf
 
 
 def _simplify(swap: Swap) -> Swap:
     """Pairs equivalent to several consecutive swaps, with each segment at most once."""
-    where = undo_exchange(swap, {s: s for pair in swap for s in pair})
-    return tuple((a, b) for a, b in where.items() if a < b and where[b] == a)
+    moved_to = undo_exchange(swap, {s: s for pair in swap for s in pair})
+    return tuple((a, b) for a, b in moved_to.items() if a < b and moved_to[b] == a)
 
 
 def compare_hips(
@@ -211,14 +211,14 @@ def compare_hips(
     if left is None or right is None:
         return None
     line = np.median(right.place_in("pelvis"), axis=0) - np.median(left.place_in("pelvis"), axis=0)
-    said: list[float] = []
+    cosines: list[float] = []
     for side in SIDES:
         thigh, shank, foot = THIGH[side], SHANK[side], FOOT[side]
         chain = [spoken.get(joint) for joint in (("pelvis", thigh), (thigh, shank), (shank, foot))]
         whole = [w for w in chain if w is not None]
         if len(whole) == len(chain):
-            said += _cosines(motions, whole, line, rate_hz, params)
-    return float(np.median(said)) if len(said) >= LEAST_SAYING else None
+            cosines += _cosines(motions, whole, line, rate_hz, params)
+    return float(np.median(cosines)) if len(cosines) >= LEAST_SAYING else None
 
 
 def _cosines(
@@ -231,7 +231,7 @@ def _cosines(
     """One cosine per swing of a leg."""
     foot, shank = motions[chain[-1].second], motions[chain[-1].first]
     speed, level, pelvis = find_lengths(foot.rate), foot.level, motions["pelvis"].q
-    swings, said = find_swings(shank.rate, rate_hz), []
+    swings, cosines = find_swings(shank.rate, rate_hz), []
     for a, b in pairwise(swings):
         if b - a > LONGEST_SWING_S * rate_hz or b - a < 5:
             continue
@@ -245,7 +245,7 @@ def _cosines(
             continue
         c, s = np.cos(turn), np.sin(turn)
         ahead = np.array([c * way[0] - s * way[1], s * way[0] + c * way[1]])
-        across = rotate(pelvis[(a + b) // 2], line)[:2]
-        size = np.linalg.norm(across) * np.linalg.norm(ahead)
-        said.append(float((across[0] * ahead[1] - across[1] * ahead[0]) / max(size, 1e-9)))
-    return said
+        hip_line = rotate(pelvis[(a + b) // 2], line)[:2]
+        size = np.linalg.norm(hip_line) * np.linalg.norm(ahead)
+        cosines.append(float((hip_line[0] * ahead[1] - hip_line[1] * ahead[0]) / max(size, 1e-9)))
+    return cosines

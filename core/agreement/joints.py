@@ -22,7 +22,7 @@ CHAINS: Final[tuple[tuple[Segment, ...], ...]] = tuple(
 """Sensors below one joint that may share a wrong clock: only that joint speaks against them."""
 
 
-def list_worn_joints(worn: Iterable[Segment]) -> tuple[tuple[Segment, Segment], ...]:
+def list_worn_joints(segments: Iterable[Segment]) -> tuple[tuple[Segment, Segment], ...]:
     """Joints with sensors on both segments."""
-    there = set(worn)
-    return tuple(joint for joint in LEG_JOINTS if there.issuperset(joint))
+    instrumented = set(segments)
+    return tuple(joint for joint in LEG_JOINTS if instrumented.issuperset(joint))

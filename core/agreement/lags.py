@@ -89,10 +89,10 @@ def find_sensor_lags(joints: Sequence[JointWindows], params: LagParams) -> tuple
     y = lag / sd
     chosen: list[tuple[Segment, ...]] = []
     while sum(map(len, chosen)) < MOST_LATE:
-        found = _best_addition(use, sd, y, chosen, params)
-        if found is None:
+        addition = _best_addition(use, sd, y, chosen, params)
+        if addition is None:
             break
-        chosen.append(found)
+        chosen.append(addition)
     if not chosen:
         return ()
     A = np.column_stack([_column(use, sd, c) for c in chosen])
@@ -148,8 +148,8 @@ def list_judged(joints: Sequence[JointWindows], params: LagParams) -> frozenset[
 
 def _speaking(joints: Sequence[JointWindows], params: LagParams) -> list[JointWindows]:
     """Joints whose windows are consistent enough to estimate a lag."""
-    kept = [w.choose(w.certain & (w.residual < params.worst_residual)) for w in joints]
-    return [w for w in kept if len(w.t_s) >= params.least_windows]
+    usable = [w.choose(w.certain & (w.residual < params.worst_residual)) for w in joints]
+    return [w for w in usable if len(w.t_s) >= params.least_windows]
 
 
 def _further(use: Sequence[JointWindows], speaking: Sequence[JointWindows]) -> int:
@@ -182,22 +182,22 @@ def _best_addition(
     params: LagParams,
 ) -> tuple[Segment, ...] | None:
     """The sensor or group that explains most of the residual, None if none explains enough."""
-    worn = sorted({s for w in use for s in (w.first, w.second)})
+    segments = sorted({s for w in use for s in (w.first, w.second)})
     linked = {frozenset((w.first, w.second)) for w in use}
     groups = [g for g in CHAINS if all(frozenset(e) in linked for e in pairwise(g))]
-    taken = {s for c in chosen for s in c}
-    before = _left_over([_column(use, sd, c) for c in chosen], y)
+    explained = {s for c in chosen for s in c}
+    residual = _left_over([_column(use, sd, c) for c in chosen], y)
     best, most = None, params.z**2
-    if before <= most:
+    if residual <= most:
         return None
-    for option in (*((s,) for s in worn), *groups):
+    for option in (*((s,) for s in segments), *groups):
         column = _column(use, sd, option)
-        if taken & set(option) or not column.any():
+        if explained & set(option) or not column.any():
             continue
         columns = [*(_column(use, sd, c) for c in chosen), column]
         if np.linalg.matrix_rank(np.column_stack(columns)) < len(columns):
             continue
-        worth = (before - _left_over(columns, y)) / (1.0 if len(option) == 1 else GROUP_COST)
+        worth = (residual - _left_over(columns, y)) / (1.0 if len(option) == 1 else GROUP_COST)
         if worth > most:
             best, most = option, worth
     return best
@@ -215,8 +215,8 @@ def _slope(w: JointWindows) -> tuple[float, float]:
     apart = w.t_s[None, :] - w.t_s[:, None]
     i, j = np.nonzero(apart > FAR * (w.t_s[-1] - w.t_s[0]))
     slope = float(np.median((w.lag_s[j] - w.lag_s[i]) / apart[i, j]))
-    rest = w.lag_s - slope * w.t_s
-    spread = max(MAD * float(np.median(np.abs(rest - np.median(rest)))), LEAST_DRIFT_SPREAD_S)
+    remainder = w.lag_s - slope * w.t_s
+    spread = max(MAD * float(np.median(np.abs(remainder - np.median(remainder)))), LEAST_DRIFT_SPREAD_S)
     overlap = w.width_s / w.step_s
     reach = np.sqrt(max(float(np.sum((w.t_s - w.t_s.mean()) ** 2)), 1e-9))
     return slope, float(np.sqrt(overlap) * MEDIAN_SD * spread / reach)

@@ -88,13 +88,13 @@ class LiveAgreement:
         if not len(self._worn):
             return
         start = 0
-        for at in stood:
-            self._collect(block, start, at - block.first)
-            start = at - block.first
-            self._second_at = at
+        for stood_at in stood:
+            self._collect(block, start, stood_at - block.first)
+            start = stood_at - block.first
+            self._second_at = stood_at
             standing = self._read_last(STANDING * self._second)
             self._due.append(
-                SensorComparison(self._worn, standing, at, self._rate_hz, self._thin, self._params)
+                SensorComparison(self._worn, standing, stood_at, self._rate_hz, self._thin, self._params)
             )
         self._collect(block, start, len(block))
 
@@ -126,8 +126,8 @@ class LiveAgreement:
             if self._second_at is not None:
                 end = min(stop, self._second_at + self._second - block.first)
             part = slice(start, end)
-            taken = take_columns(block.acc[part], block.gyr[part], block.valid[part], self._columns)
-            self._last.append(RawSecond(*taken))
+            selected = take_columns(block.acc[part], block.gyr[part], block.valid[part], self._columns)
+            self._last.append(RawSecond(*selected))
             self._held += end - start
             while self._held - len(self._last[0].acc) >= STANDING * self._second:
                 self._held -= len(self._last.popleft().acc)
@@ -189,10 +189,10 @@ def compile_live_agreement() -> None:
     compile_agreement_kernels()
     n = 200
     wave = np.random.default_rng(0).normal(size=(2, 10 * n, 7, 3))
-    worn: tuple[Segment, ...] = (
+    segments: tuple[Segment, ...] = (
         "pelvis", "thigh_l", "thigh_r", "shank_l", "shank_r", "foot_l", "foot_r",
     )  # fmt: skip
-    watch = LiveAgreement(worn, 100.0)
+    watch = LiveAgreement(segments, 100.0)
     valid = np.ones((10 * n, 7), np.bool_)
     watch.push(UniformBlock(0, np.arange(10 * n) / 100.0, wave[0], wave[1], valid, ~valid), (n,))
     watch.compare()

@@ -137,10 +137,10 @@ class SensorComparison:
             sided = any({SHANK[side], FOOT[side]} <= heard for side in SIDES)
             if cosine is None and sided and not patient:
                 return
-        self._exchange = found = judge_legs(swap, ratio, cosine, p.agreement.exchange)
-        self._worn_as = names = undo_exchange(found.swap, {s: s for s in self._column})
-        kept = {frozenset((names[a], names[b])) for a, b in list_worn_joints(names)}
-        self._pairs = {k: x for k, x in self._pairs.items() if k in kept}
+        self._exchange = judged_exchange = judge_legs(swap, ratio, cosine, p.agreement.exchange)
+        self._worn_as = names = undo_exchange(judged_exchange.swap, {s: s for s in self._column})
+        kept_pairs = {frozenset((names[a], names[b])) for a, b in list_worn_joints(names)}
+        self._pairs = {k: x for k, x in self._pairs.items() if k in kept_pairs}
 
     def _read_motions(self, worn_as: Mapping[Segment, Segment]) -> tuple[float, dict[Segment, LevelMotion]]:
         """Start on the axis, and the motions since; segment by the best labels → as declared."""
@@ -161,35 +161,35 @@ class SensorComparison:
         moving = [w.choose(self._is_moving(joint, w)) for joint, w in joints.items()]
         turns = find_turns(moving, axes, params)
         since_s = max((x.t_s[-1] for x in turns.values()), default=0.0) - params.near_s
-        told = {x.segment for x in slipped}
-        found = []
+        reported = {x.segment for x in slipped}
+        new_slips = []
         steps = {
             s: x
             for s, x in judge_turns(turns, self._half, params, since_s).items()
-            if s not in told and self._is_walked(turns[s], x.at_s)
+            if s not in reported and self._is_walked(turns[s], x.at_s)
         }
         for segment, step in steps.items() if len(steps) == 1 else ():
-            wanted = {segment, *choose_leg(segment)} & set(self._worn_as)
-            start_s, motions = self._read_motions({s: self._worn_as[s] for s in wanted})
+            needed = {segment, *choose_leg(segment)} & set(self._worn_as)
+            start_s, motions = self._read_motions({s: self._worn_as[s] for s in needed})
             valid = self._terms.read_motion(self._column[self._worn_as[segment]])[1]
             own = replace(step, at_s=step.at_s - start_s)
             slip = question_strides(
                 segment, own, axes[segment], motions, valid, self._rate_hz, self._half, params
             )
             if slip is not None:
-                found.append(replace(slip, at_s=slip.at_s + start_s))
+                new_slips.append(replace(slip, at_s=slip.at_s + start_s))
         back = [
             x.segment
             for x in slipped
             if x.segment in turns and not is_lasting(turns[x.segment], x.at_s, x.turn_rad, self._half, params)
         ]
-        return tuple(found), frozenset(back)
+        return tuple(new_slips), frozenset(back)
 
-    def _is_walked(self, found: PlaceTurns, at_s: float) -> bool:
+    def _is_walked(self, turns: PlaceTurns, at_s: float) -> bool:
         """Whether there was walking at a moment, or enough walking since."""
-        before, after = found.t_s <= at_s - self._half, found.t_s >= at_s + self._half
-        during = ~before & ~after
-        return bool(during.any()) or int(after.sum()) >= self._params.pause_windows
+        earlier, later = turns.t_s <= at_s - self._half, turns.t_s >= at_s + self._half
+        during = ~earlier & ~later
+        return bool(during.any()) or int(later.sum()) >= self._params.pause_windows
 
     def _find_axes(self) -> dict[Segment, Floats]:
         """Main rotation axis of every leg sensor, with the same sign as in the previous second."""

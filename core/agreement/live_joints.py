@@ -56,13 +56,13 @@ class LivePair:
         self._power.append((float(new.power[i]), float(new.power[j])))
         if len(self._power) < self._params.window_chunks:
             return False
-        found = self._sums.solve(NOW, self._chunk, self._params)
-        if len(found):
+        solved = self._sums.solve(NOW, self._chunk, self._params)
+        if len(solved):
             self._rows[:-1] = self._rows[1:]
-            self._rows[-1, 0], self._rows[-1, 1:12] = middle_s, found[0]
+            self._rows[-1, 0], self._rows[-1, 1:12] = middle_s, solved[0]
             self._rows[-1, 12:] = np.mean(self._power, axis=0)
             self._count = min(self._count + 1, KEPT)
-        return bool(len(found))
+        return bool(len(solved))
 
     def read(self) -> JointWindows:
         """The stored windows."""
@@ -78,24 +78,24 @@ class LivePair:
         return {self.names[0]: rows[:, 12], self.names[1]: rows[:, 13]}
 
 
-def list_pairs(worn: Iterable[Segment]) -> tuple[Pair, ...]:
+def list_pairs(segments: Iterable[Segment]) -> tuple[Pair, ...]:
     """Joints of the declared labels, and pairs that would be joints if sensors were swapped."""
-    there = frozenset(worn)
-    found: dict[frozenset[Segment], Pair] = {frozenset(x): x for x in list_worn_joints(there)}
+    instrumented = frozenset(segments)
+    pairs: dict[frozenset[Segment], Pair] = {frozenset(x): x for x in list_worn_joints(instrumented)}
     for swap in SWAPS:
-        if all(s in there for pair in swap for s in pair):
-            names = undo_exchange(swap, {s: s for s in there})
-            for a, b in list_worn_joints(there):
-                found.setdefault(frozenset((names[a], names[b])), (names[a], names[b]))
-    return tuple(found.values())
+        if all(s in instrumented for pair in swap for s in pair):
+            names = undo_exchange(swap, {s: s for s in instrumented})
+            for a, b in list_worn_joints(instrumented):
+                pairs.setdefault(frozenset((names[a], names[b])), (names[a], names[b]))
+    return tuple(pairs.values())
 
 
 def relabel(swap: Swap, pairs: Mapping[frozenset[Segment], JointWindows]) -> dict[Pair, JointWindows]:
     """Joints by the best labels, for the available pairs."""
     names = undo_exchange(swap, {s: s for x in pairs for s in x})
-    found = {}
+    relabelled = {}
     for a, b in LEG_JOINTS:
         w = pairs.get(frozenset((names[a], names[b]))) if a in names and b in names else None
         if w is not None:
-            found[a, b] = replace(w if w.first == names[a] else w.turn_round(), first=a, second=b)
-    return found
+            relabelled[a, b] = replace(w if w.first == names[a] else w.turn_round(), first=a, second=b)
+    return relabelled

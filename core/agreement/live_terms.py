@@ -94,10 +94,10 @@ class LiveTerms:
         rate = new.gyr - self._bias
         q = np.empty((rate.shape[1], len(rate), 4))
         for i, (state, norm) in enumerate(self._tilt):
-            q[i], after = advance(
+            q[i], end_state = advance(
                 state, rate[:, i], new.acc[:, i], new.valid[:, i], self._rate_hz, norm, self._params.attitude
             )
-            self._tilt[i] = after, norm
+            self._tilt[i] = end_state, norm
         self._raw.append((q, RawSecond(new.acc, rate, new.valid)))
         self._seconds += 1
         if len(self._raw) < 2:
@@ -148,8 +148,8 @@ class LiveTerms:
         first = BEFORE * n // self._thin
         part = slice(first - widest, first + n // self._thin + widest)
         M = take_mean_out(slow, self._rate_hz / self._thin, self._params, pad=0)[:, part]
-        seen = [self._motion[k].valid for k in range(-min(len(self._motion), BEFORE + 1 + AFTER), 0)]
-        usable = find_usable(np.concatenate(seen, axis=1).T, self._rate_hz)[:, :: self._thin][:, part]
+        validity = [self._motion[k].valid for k in range(-min(len(self._motion), BEFORE + 1 + AFTER), 0)]
+        usable = find_usable(np.concatenate(validity, axis=1).T, self._rate_hz)[:, :: self._thin][:, part]
         rate = self._motion[-1 - AFTER].rate
         moments = rate.transpose(0, 2, 1) @ rate / n
         return TermSecond(

@@ -50,24 +50,24 @@ def find_mirrored(
     gains: dict[frozenset[Segment], float] = {}
     bad: set[frozenset[Segment]] = set()
     for a, b in joints:
-        other = compare_at_joint((a, b), terms[a], turn_round(terms[b]), joint_params)
+        inverted = compare_at_joint((a, b), terms[a], turn_round(terms[b]), joint_params)
         as_stated = misfits.get(frozenset((a, b)))
-        if as_stated is not None and len(other.t_s):
-            misfit = float(np.median(other.residual))
+        if as_stated is not None and len(inverted.t_s):
+            misfit = float(np.median(inverted.residual))
             gains[frozenset((a, b))] = float(np.log(as_stated / misfit))
             bad |= {frozenset((a, b))} if misfit > params.worst_residual else set()
-    worn = sorted({s for joint in gains for s in joint})
-    most = min(MOST, (len(worn) - 1) // 2)
-    found = {
+    segments = sorted({s for joint in gains for s in joint})
+    most = min(MOST, (len(segments) - 1) // 2)
+    gain_by_sensor = {
         frozenset(chosen): sum(gain for joint, gain in gains.items() if len(joint & set(chosen)) == 1)
         for k in range(1, most + 1)
-        for chosen in combinations(worn, k)
+        for chosen in combinations(segments, k)
     }
-    order = sorted(found, key=lambda s: found[s], reverse=True)
-    if not order or found[order[0]] < np.log(params.mirrored):
+    order = sorted(gain_by_sensor, key=lambda s: gain_by_sensor[s], reverse=True)
+    if not order or gain_by_sensor[order[0]] < np.log(params.mirrored):
         return frozenset(), 0.0
     if any(len(joint & order[0]) == 1 for joint in bad):
         return frozenset(), 0.0
-    if len(order) > 1 and found[order[0]] - found[order[1]] < np.log(params.distinct):
+    if len(order) > 1 and gain_by_sensor[order[0]] - gain_by_sensor[order[1]] < np.log(params.distinct):
         return frozenset(), 0.0
-    return order[0], found[order[0]]
+    return order[0], gain_by_sensor[order[0]]

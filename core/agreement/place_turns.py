@@ -63,8 +63,8 @@ def find_turns(
     ----------
     joints : with usable windows (`is_moving`). axes : sensor → main rotation axis (3,).
     """
-    found = {s: _find_place_turns(s, joints, axis, params) for s, axis in axes.items()}
-    return {s: x for s, x in found.items() if x is not None}
+    turns = {s: _find_place_turns(s, joints, axis, params) for s, axis in axes.items()}
+    return {s: x for s, x in turns.items() if x is not None}
 
 
 def judge_turns(
@@ -77,11 +77,11 @@ def judge_turns(
     half : half a window width, s. since_s : earlier moments are ignored.
     """
     steps: dict[Segment, PlaceStep] = {}
-    for segment, found in turns.items():
-        step = _find_best_step(found, half, params, since_s)
+    for segment, place_turns in turns.items():
+        step = _find_best_step(place_turns, half, params, since_s)
         if step is None or not _is_alone(segment, step, turns, half, params):
             continue
-        if _measure_misfit(found, step, half) < params.misfit:
+        if _measure_misfit(place_turns, step, half) < params.misfit:
             steps[segment] = step
     return steps
 
@@ -114,12 +114,12 @@ def turn_places(V, axis):  # type: ignore[no-untyped-def]
     """
     m, joints = V.shape[:2]
     x, y, z = axis
-    across, back = np.empty(V.shape), np.empty(V.shape)
+    perpendicular, back = np.empty(V.shape), np.empty(V.shape)
     for k in range(m):
         for j in range(joints):
             along = V[k, j, 0] * x + V[k, j, 1] * y + V[k, j, 2] * z
             for c in range(3):
-                across[k, j, c] = back[k, j, c] = V[k, j, c] - along * axis[c]
+                perpendicular[k, j, c] = back[k, j, c] = V[k, j, c] - along * axis[c]
     turn, typical = np.zeros(m), np.empty((joints, 3))
     for _ in range(2):
         for j in range(joints):
@@ -129,13 +129,13 @@ def turn_places(V, axis):  # type: ignore[no-untyped-def]
             sine = cosine = 0.0
             for j in range(joints):
                 a, b, d = typical[j]
-                p, q, r = across[k, j]
+                p, q, r = perpendicular[k, j]
                 sine += x * (b * r - d * q) + y * (d * p - a * r) + z * (a * q - b * p)
                 cosine += a * p + b * q + d * r
             turn[k] = np.arctan2(sine, cosine)
             c0, s0 = np.cos(turn[k]), np.sin(turn[k])
             for j in range(joints):
-                p, q, r = across[k, j]
+                p, q, r = perpendicular[k, j]
                 back[k, j, 0] = c0 * p - s0 * (y * r - z * q)
                 back[k, j, 1] = c0 * q - s0 * (z * p - x * r)
                 back[k, j, 2] = c0 * r - s0 * (x * q - y * p)
@@ -143,100 +143,100 @@ def turn_places(V, axis):  # type: ignore[no-untyped-def]
 
 
 def measure_step(
-    found: PlaceTurns, at_s: float, half: float, floor: float, reach: float = np.inf
+    turns: PlaceTurns, at_s: float, half: float, floor: float, reach: float = np.inf
 ) -> tuple[float, float] | None:
     """Rotation between windows entirely before and entirely after a moment, and its standard deviation."""
-    size, sd = _compare_sides(found.t_s, found.turn, found.step_s, at_s, half, floor, reach)
+    size, sd = _compare_sides(turns.t_s, turns.turn, turns.step_s, at_s, half, floor, reach)
     return None if np.isnan(size) else (size, sd)
 
 
-def is_lasting(found: PlaceTurns, at_s: float, turn_rad: float, half: float, params: SlipParams) -> bool:
+def is_lasting(turns: PlaceTurns, at_s: float, turn_rad: float, half: float, params: SlipParams) -> bool:
     """Whether a rotation persists; also true if no earlier window is left for comparison."""
-    measured = measure_step(found, at_s, half, params.floor_rad)
+    measured = measure_step(turns, at_s, half, params.floor_rad)
     return measured is None or measured[0] / turn_rad >= params.lasting
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _compare_sides(t_s, turn, step_s, at_s, half, floor, reach):  # type: ignore[no-untyped-def]
     """Difference of the medians before and after, and its spread; NaN if either has no window."""
-    before = turn[(t_s <= at_s - half) & (t_s >= at_s - reach)]
-    after = turn[(t_s >= at_s + half) & (t_s <= at_s + reach)]
-    if len(before) == 0 or len(after) == 0:
+    earlier = turn[(t_s <= at_s - half) & (t_s >= at_s - reach)]
+    later = turn[(t_s >= at_s + half) & (t_s <= at_s + reach)]
+    if len(earlier) == 0 or len(later) == 0:
         return np.nan, np.nan
     spread, inverse = floor, 0.0
-    for x in (before, after):
+    for x in (earlier, later):
         spread = max(spread, MAD * np.median(np.abs(x - np.median(x))))
         inverse += 1.0 / min(max(len(x) * step_s / (2.0 * half), 1.0), INDEPENDENT)
-    return np.median(after) - np.median(before), spread * np.sqrt(inverse)
+    return np.median(later) - np.median(earlier), spread * np.sqrt(inverse)
 
 
-def _find_best_step(found: PlaceTurns, half: float, params: SlipParams, since_s: float) -> PlaceStep | None:
+def _find_best_step(turns: PlaceTurns, half: float, params: SlipParams, since_s: float) -> PlaceStep | None:
     """The moment with the clearest lasting change of the joint positions; None below the limits."""
     best, most = None, 0.0
     least = params.least_windows
-    first, last = max(found.t_s[least - 1] + half, since_s), found.t_s[-least] - half
-    moments = np.arange(first, last + 0.01, max(FINEST_S, 0.5 * found.step_s))
-    for at in moments[_is_likely(found, moments, half, LIKELY * params.least_rad)]:
-        measured = measure_step(found, float(at), half, params.floor_rad, params.near_s)
-        if measured is None or not is_lasting(found, float(at), measured[0], half, params):
+    first, last = max(turns.t_s[least - 1] + half, since_s), turns.t_s[-least] - half
+    moments = np.arange(first, last + 0.01, max(FINEST_S, 0.5 * turns.step_s))
+    for moment in moments[_is_likely(turns, moments, half, LIKELY * params.least_rad)]:
+        measured = measure_step(turns, float(moment), half, params.floor_rad, params.near_s)
+        if measured is None or not is_lasting(turns, float(moment), measured[0], half, params):
             continue
         size, sd = measured
         z = abs(size) / sd
         if z * abs(size) > most:
-            best, most = PlaceStep(float(at), size, z, sd), z * abs(size)
+            best, most = PlaceStep(float(moment), size, z, sd), z * abs(size)
     if best is None or abs(best.size) <= params.least_rad or best.z <= params.z:
         return None
-    return replace(best, at_s=_find_moment(found, best, half, moments, params))
+    return replace(best, at_s=_find_moment(turns, best, half, moments, params))
 
 
 def _find_moment(
-    found: PlaceTurns, step: PlaceStep, half: float, moments: Floats, params: SlipParams
+    turns: PlaceTurns, step: PlaceStep, half: float, moments: Floats, params: SlipParams
 ) -> float:
     """Time of the rotation: windows that contain it show part of it, which makes a ramp of their width."""
     best, least = step.at_s, np.inf
-    near = np.abs(found.t_s - step.at_s) <= params.near_s
-    t, x = found.t_s[near], found.turn[near]
-    for at in moments[np.abs(moments - step.at_s) <= 0.5 * params.near_s]:
-        before, after = x[t <= at - half], x[t >= at + half]
-        if not len(before) or not len(after):
+    near = np.abs(turns.t_s - step.at_s) <= params.near_s
+    t, x = turns.t_s[near], turns.turn[near]
+    for moment in moments[np.abs(moments - step.at_s) <= 0.5 * params.near_s]:
+        earlier, later = x[t <= moment - half], x[t >= moment + half]
+        if not len(earlier) or not len(later):
             continue
-        share = np.clip((t - at + half) / (2.0 * half), 0.0, 1.0)
-        ramp = np.median(before) + share * (np.median(after) - np.median(before))
+        share = np.clip((t - moment + half) / (2.0 * half), 0.0, 1.0)
+        ramp = np.median(earlier) + share * (np.median(later) - np.median(earlier))
         left = float(np.abs(x - ramp).sum())
         if left < least:
-            best, least = float(at), left
+            best, least = float(moment), left
     return best
 
 
-def _is_likely(found: PlaceTurns, moments: Floats, half: float, least: float) -> Bools:
+def _is_likely(turns: PlaceTurns, moments: Floats, half: float, least: float) -> Bools:
     """Moments with a difference of the mean rotation before and after above a minimum: a fast
     preselection.
     """
-    total = np.concatenate(([0.0], np.cumsum(found.turn)))
-    a = np.searchsorted(found.t_s, moments - half + 1e-9)
-    b = np.searchsorted(found.t_s, moments + half - 1e-9)
-    n = len(found.turn)
-    after = (total[n] - total[b]) / np.maximum(n - b, 1)
-    return np.asarray(np.abs(after - total[a] / np.maximum(a, 1)) > least, np.bool_)
+    total = np.concatenate(([0.0], np.cumsum(turns.turn)))
+    a = np.searchsorted(turns.t_s, moments - half + 1e-9)
+    b = np.searchsorted(turns.t_s, moments + half - 1e-9)
+    n = len(turns.turn)
+    mean_after = (total[n] - total[b]) / np.maximum(n - b, 1)
+    return np.asarray(np.abs(mean_after - total[a] / np.maximum(a, 1)) > least, np.bool_)
 
 
 def _is_alone(
     segment: Segment, step: PlaceStep, turns: Mapping[Segment, PlaceTurns], half: float, params: SlipParams
 ) -> bool:
     """Whether the other sensors remain stable at that moment; a change of gait rotates several."""
-    others = []
-    for other, found in turns.items():
-        if other == segment:
+    sizes = []
+    for neighbour, place_turns in turns.items():
+        if neighbour == segment:
             continue
-        measured = measure_step(found, step.at_s, half, params.floor_rad, params.near_s)
+        measured = measure_step(place_turns, step.at_s, half, params.floor_rad, params.near_s)
         if measured is not None:
-            others.append(max(0.0, abs(measured[0]) - DOUBT * measured[1]))
-    return len(others) > 1 and max(others) < params.alone * abs(step.size)
+            sizes.append(max(0.0, abs(measured[0]) - DOUBT * measured[1]))
+    return len(sizes) > 1 and max(sizes) < params.alone * abs(step.size)
 
 
-def _measure_misfit(found: PlaceTurns, step: PlaceStep, half: float) -> float:
+def _measure_misfit(turns: PlaceTurns, step: PlaceStep, half: float) -> float:
     """Relative change of the joint positions that is not explained by the rotation."""
-    before = np.median(found.places[found.t_s <= step.at_s - half], axis=0)
-    after = np.median(found.places[found.t_s >= step.at_s + half], axis=0)
-    size = 0.5 * float(np.linalg.norm(before) + np.linalg.norm(after))
-    return float(np.linalg.norm(before - after) / max(size, 1e-9))
+    places_before = np.median(turns.places[turns.t_s <= step.at_s - half], axis=0)
+    places_after = np.median(turns.places[turns.t_s >= step.at_s + half], axis=0)
+    size = 0.5 * float(np.linalg.norm(places_before) + np.linalg.norm(places_after))
+    return float(np.linalg.norm(places_before - places_after) / max(size, 1e-9))

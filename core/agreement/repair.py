@@ -32,14 +32,14 @@ def take_lag_out(
     x = np.concatenate(
         (signals.acc, signals.gyr) + ((signals.mag,) if signals.mag is not None else ()), axis=1
     )[ok]
-    laid, valid, filled = lay_signal(own, x, float(t_s[0]), n, rate_hz, rate_hz, params)
+    resampled, valid, filled = lay_signal(own, x, float(t_s[0]), n, rate_hz, rate_hz, params)
     valid &= (t_s >= own[0]) & (t_s <= own[-1])
     nearest = np.clip(np.round((t_s + lag_s - t_s[0]) * rate_hz).astype(int), 0, n - 1)
     return replace(
         signals,
-        acc=laid[0],
-        gyr=laid[1],
-        mag=laid[2] if with_mag else None,
+        acc=resampled[0],
+        gyr=resampled[1],
+        mag=resampled[2] if with_mag else None,
         valid=valid,
         interpolated=(filled | signals.interpolated[nearest]) & valid,
     )
@@ -55,12 +55,12 @@ def turn_back(signals: SensorSignals, t_s: Floats, slip: SensorSlip) -> SensorSi
     The gyroscope measured that rotation; left in, the integrated orientation would be wrong by the slip.
     """
     turn = slip.turn_rad * np.array(slip.axis)
-    after = t_s >= slip.at_s
-    slipping = after & (t_s < slip.at_s + SLIPPING_S)
+    slipped = t_s >= slip.at_s
+    slipping = slipped & (t_s < slip.at_s + SLIPPING_S)
     back = exp(-turn)
 
     def turned(x: Floats) -> Floats:
-        return np.where(after[:, None], rotate(back, x), x)
+        return np.where(slipped[:, None], rotate(back, x), x)
 
     # a turn of the sensor by r shows −r in its rate
     lasting_s = np.count_nonzero(slipping) * float(t_s[1] - t_s[0])

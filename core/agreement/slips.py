@@ -99,12 +99,12 @@ def _find_judged(
     """Moments with enough windows entirely before and after, for sensors where these cover most of the
     walk.
     """
-    judged, least = {}, params.least_windows
+    periods, least = {}, params.least_windows
     for segment, t_s in ((s, x.t_s) for s, x in turns.items()):
         start, end = float(t_s[least - 1]) + half, float(t_s[-least]) - half
         if end - start >= params.judged * float(t_s[-1] - t_s[0]):
-            judged[segment] = start, end
-    return judged
+            periods[segment] = start, end
+    return periods
 
 
 def is_moving(w: JointWindows, swing: Mapping[Segment, Floats], params: SlipParams) -> Bools:
@@ -151,7 +151,7 @@ def question_strides(
     ----------
     step : its time is relative to the first sample of `motions`. valid : (n,) samples of the sensor.
     """
-    at, within = step.at_s, half
+    moment_s, margin_s = step.at_s, half
     share = None
     for leg in choose_leg(segment):
         borders = find_swings(motions[leg].rate, rate_hz) if leg in motions else np.zeros(0, np.int64)
@@ -170,19 +170,19 @@ def question_strides(
                 left = float(np.abs(a - np.median(a)).sum() + np.abs(b - np.median(b)).sum())
                 left -= 0.5 * len(a) * got * np.sign(step.size)
                 if left < best:
-                    best, share, at = left, got / step.size, float(when)
-                    within = 0.5 * float(u.start_s[k] - u.end_s[k - 1]) + 0.6 + abs(at - step.at_s)
+                    best, share, moment_s = left, got / step.size, float(when)
+                    margin_s = 0.5 * float(u.start_s[k] - u.end_s[k - 1]) + 0.6 + abs(moment_s - step.at_s)
             break
     witnessed = share is not None and share >= params.agree
     if not witnessed:
-        at, within = step.at_s, half
+        moment_s, margin_s = step.at_s, half
         clear = abs(step.size) > params.sure_rad and step.z > 2.0 * params.z
         if share is not None and not clear:
             return None
     if abs(step.size) <= params.least_rad + (0.0 if witnessed else params.unwitnessed_rad):
         return None
     along = tuple(float(v) for v in axis)
-    return SensorSlip(segment, at, max(within, params.within_s), step.size, step.sd, along)  # type: ignore[arg-type]
+    return SensorSlip(segment, moment_s, max(margin_s, params.within_s), step.size, step.sd, along)  # type: ignore[arg-type]
 
 
 def compile_agreement_kernels() -> None:
@@ -195,5 +195,5 @@ def compile_agreement_kernels() -> None:
     _ = terms.motion.level
     compare_at_joint(("pelvis", "thigh_l"), terms, terms, JointParams())
     turn, places = turn_places(np.ones((4, 2, 3)), np.array([1.0, 0.0, 0.0]))
-    found = PlaceTurns(np.arange(4.0), turn, places, 1.0)
-    measure_step(found, 2.0, 1.0, 1.0)
+    place_turns = PlaceTurns(np.arange(4.0), turn, places, 1.0)
+    measure_step(place_turns, 2.0, 1.0, 1.0)

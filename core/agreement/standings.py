@@ -67,18 +67,18 @@ def compare_standings(
     if not all(shank in terms for shank in SHANK.values()):
         return (), stayed
     rests = drop_false_rests(recording, find_rest_windows(recording, segments=legs))
-    for before, walk, after in _list_walks(rests, terms, recording.rate_hz, params):
-        turns = _measure_turns(recording, terms, before, walk, after)
+    for first_rest, walk, second_rest in _list_walks(rests, terms, recording.rate_hz, params):
+        turns = _measure_turns(recording, terms, first_rest, walk, second_rest)
         for segment, x in turns.items():
             if max(abs(x.walking), abs(x.standing)) < params.least_rad:
-                until = stayed.get(segment, before)
-                stayed[segment] = (until[0], after[1])
+                until = stayed.get(segment, first_rest)
+                stayed[segment] = (until[0], second_rest[1])
             elif segment not in slips and _has_slipped(segment, turns, params):
-                at, half = 0.5 * (before[1] + walk[0]), 0.5 * (walk[0] - before[1])
+                middle_s, half = 0.5 * (first_rest[1] + walk[0]), 0.5 * (walk[0] - first_rest[1])
                 along = tuple(float(v) for v in x.axis)
                 sd = max(params.standing_sd_rad, 0.5 * abs(x.walking - x.standing))
-                found = SensorSlip(segment, at, half, x.walking, sd, along, True)  # type: ignore[arg-type]
-                slips[segment] = found
+                slip = SensorSlip(segment, middle_s, half, x.walking, sd, along, True)  # type: ignore[arg-type]
+                slips[segment] = slip
     return tuple(slips.values()), {s: x for s, x in stayed.items() if s not in slips}
 
 
@@ -117,12 +117,12 @@ def _list_walks(
 def _measure_turns(
     recording: UniformRecording,
     terms: Mapping[Segment, SensorTerms],
-    before: Window,
+    first_rest: Window,
     walk: Window,
-    after: Window,
+    second_rest: Window,
 ) -> dict[Segment, StandingTurn]:
     rate_hz = recording.rate_hz
-    found: dict[Segment, tuple[float, float, Floats]] = {}
+    measured: dict[Segment, tuple[float, float, Floats]] = {}
     for side in SIDES:
         part = index_window(walk, rate_hz)
         shank = terms[SHANK[side]].motion.rate[part]
@@ -130,20 +130,20 @@ def _measure_turns(
             axis = _find_forward_axis(terms[segment].motion.rate[part], shank, rate_hz)
             x = recording.sensors[segment]
             ups = []
-            for window in (before, walk, after):
-                there = index_window(window, rate_hz)
-                ok = x.valid[there]
-                ups.append(x.cut("acc", there)[ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
+            for window in (first_rest, walk, second_rest):
+                samples = index_window(window, rate_hz)
+                ok = x.valid[samples]
+                ups.append(x.cut("acc", samples)[ok].mean(axis=0) if ok.any() else np.full(3, np.nan))
             walking, standing = (_turn_about(axis, ups[0], up) for up in ups[1:])
             if np.isfinite(walking + standing):
-                found[segment] = walking, standing, axis
+                measured[segment] = walking, standing, axis
     turns = {}
-    for segment, (walking, standing, axis) in found.items():
-        other = MIRRORED[segment]
+    for segment, (walking, standing, axis) in measured.items():
+        opposite = MIRRORED[segment]
         beyond = PARTNER.get(segment)
-        if other in found and (beyond is None or beyond in found):
-            knee = 0.0 if beyond is None else found[beyond][1]
-            turns[segment] = StandingTurn(walking - found[other][0], standing - knee, axis)
+        if opposite in measured and (beyond is None or beyond in measured):
+            knee = 0.0 if beyond is None else measured[beyond][1]
+            turns[segment] = StandingTurn(walking - measured[opposite][0], standing - knee, axis)
     return turns
 
 
@@ -157,11 +157,11 @@ def _find_forward_axis(rate: Floats, shank: Floats, rate_hz: float) -> Floats:
     leg *= np.sign(np.sum(leg**3))
     own = low_pass(rate @ axis, SMOOTH_HZ, rate_hz)
     reach = min(round(WITHIN_S * rate_hz), len(own) - 1)
-    both = [
+    lobes = [
         float(np.sum(own[max(0, -k) : len(own) - max(0, k)] * leg[max(0, k) : len(leg) + min(0, k)]))
         for k in range(-reach, reach + 1)
     ]
-    return np.asarray(axis * np.sign(max(both, key=abs)))
+    return np.asarray(axis * np.sign(max(lobes, key=abs)))
 
 
 def _turn_about(axis: Floats, a: Floats, b: Floats) -> float:

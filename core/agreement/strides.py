@@ -103,8 +103,8 @@ def find_stride_turns(
     for _ in range(2):
         typical = np.median(x @ to_matrix(exp(turn)), axis=0)
         turn = _fit_rotation(typical, x)
-    at = np.array(spans)
-    return StrideTurns(at[:, 0], at[:, 1], turn)
+    limits_s = np.array(spans)
+    return StrideTurns(limits_s[:, 0], limits_s[:, 1], turn)
 
 
 def _fit_rotation(P: Floats, Q: Floats) -> Floats:

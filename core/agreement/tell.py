@@ -33,14 +33,14 @@ def say_lag(lag: SensorLag) -> str:
 
 def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
     """Notice about a late clock and its correction."""
-    said = say_lag(lag)
+    message = say_lag(lag)
     if not lag.sure:
         return Notice(
             "clocks_disagree",
             Message(
                 "{said}. Only one joint shows this, so nothing was shifted. Synchronise the sensors and "
                 "record again.",
-                said=said,
+                said=message,
             ),
             lag.sensors[0],
         )
@@ -49,14 +49,14 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
             "sensor_late",
             Message(
                 "{said}. It was not corrected, as this analysis was set to. Adjacent joint angles are wrong.",
-                said=said,
+                said=message,
             ),
             lag.sensors[0],
         )
     if abs(lag.lag_s) <= params.warn_s:
         return Notice(
             "sensor_late",
-            Message("{said}; its samples were shifted accordingly. {KEPT}", said=said, KEPT=KEPT),
+            Message("{said}; its samples were shifted accordingly. {KEPT}", said=message, KEPT=KEPT),
             lag.sensors[0],
             severity="info",
         )
@@ -65,7 +65,7 @@ def tell_lag(lag: SensorLag, params: LagParams) -> Notice:
         Message(
             "{said}; its samples were shifted accordingly. Synchronise the sensors before the next "
             "trial. {KEPT}",
-            said=said,
+            said=message,
             KEPT=KEPT,
         ),
         lag.sensors[0],

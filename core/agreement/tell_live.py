@@ -71,7 +71,7 @@ def tell_slip_now(slip: SensorSlip) -> Notice:
     )
 
 
-def take_back(told: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
+def take_back(notice: Notice, sensors: tuple[str, ...], t_s: float) -> Notice:
     """Notice that an earlier notice no longer holds."""
-    what = RESOLVED.get(told.code, CLOCK_AGREES)
-    return Notice(AGAIN, Message(what, sensors=list_sensors(sensors)), told.sensor, t_s, "info")
+    sentence = RESOLVED.get(notice.code, CLOCK_AGREES)
+    return Notice(AGAIN, Message(sentence, sensors=list_sensors(sensors)), notice.sensor, t_s, "info")

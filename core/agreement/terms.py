@@ -124,8 +124,8 @@ class SensorTerms:
 
     def keep_first(self, until_s: float) -> SensorTerms:
         """A copy with only the first terms: those of one hour of seven sensors take 123 MB."""
-        kept = min(len(self.M), max(0, int(until_s * self.rate_hz) + 2)) if until_s < np.inf else len(self.M)
-        return self if kept == len(self.M) else replace(self, M=self.M[:kept].copy())
+        count = min(len(self.M), max(0, int(until_s * self.rate_hz) + 2)) if until_s < np.inf else len(self.M)
+        return self if count == len(self.M) else replace(self, M=self.M[:count].copy())
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,9 +247,9 @@ def start_tilt(acc: Floats, valid: Bools, rate_hz: float) -> tuple[AttitudeState
     first = np.flatnonzero(valid)[: max(1, round(START_S * rate_hz))]
     up = acc[first].mean(axis=0) if len(first) else np.array([0.0, 0.0, 1.0])
     up = up / max(float(np.linalg.norm(up)), 1e-9)
-    across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-    across /= max(float(np.linalg.norm(across)), 1e-9)
-    start = AttitudeState(from_matrix(np.stack((across, np.cross(up, across), up))), np.zeros(3), 0.0)
+    lateral = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    lateral /= max(float(np.linalg.norm(lateral)), 1e-9)
+    start = AttitudeState(from_matrix(np.stack((lateral, np.cross(up, lateral), up))), np.zeros(3), 0.0)
     return start, norm if NORMS[0] < norm < NORMS[1] else GRAVITY
 
 

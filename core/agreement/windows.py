@@ -53,11 +53,11 @@ class JointWindows:
         """Position (m, 3) of the joint in the axes of one of the two sensors, m."""
         return self.places[:, :3] if segment == self.first else self.places[:, 3:]
 
-    def choose(self, kept: Bools) -> JointWindows:
+    def choose(self, mask: Bools) -> JointWindows:
         """The same joint restricted to some of its windows (m,)."""
         return JointWindows(
-            self.first, self.second, self.t_s[kept], self.lag_s[kept], self.certain[kept],
-            self.residual[kept], self.places[kept], self.turn[kept], self.width_s, self.step_s,
+            self.first, self.second, self.t_s[mask], self.lag_s[mask], self.certain[mask],
+            self.residual[mask], self.places[mask], self.turn[mask], self.width_s, self.step_s,
         )  # fmt: skip
 
     def turn_round(self) -> JointWindows:
@@ -83,15 +83,15 @@ def compare_at_joint(
     sums.add(slice(None), first.M[:n], second.M[:n], first.usable[:n], second.usable[:n], chunk)
     width = params.window_chunks
     step = int(np.clip(np.ceil(chunks / params.windows), 1, max(1, width // 2)))
-    found = sums.solve(np.arange(0, max(0, chunks - width + 1), step), chunk, params)
+    solved = sums.solve(np.arange(0, max(0, chunks - width + 1), step), chunk, params)
     return read_windows(
-        names, found, (found[:, 0] * chunk + widest) / rate, rate, chunk, params, step_s=step * chunk / rate
+        names, solved, (solved[:, 0] * chunk + widest) / rate, rate, chunk, params, step_s=step * chunk / rate
     )
 
 
 def read_windows(
     names: tuple[Segment, Segment],
-    found: Floats,
+    solved: Floats,
     t_s: Floats,
     rate_hz: float,
     chunk: int,
@@ -103,11 +103,11 @@ def read_windows(
         first=names[0],
         second=names[1],
         t_s=t_s,
-        lag_s=found[:, 1] / rate_hz,
-        certain=found[:, 2] > 0.5,
-        residual=found[:, 3],
-        places=found[:, 4:10],
-        turn=found[:, 10],
+        lag_s=solved[:, 1] / rate_hz,
+        certain=solved[:, 2] > 0.5,
+        residual=solved[:, 3],
+        places=solved[:, 4:10],
+        turn=solved[:, 10],
         width_s=params.window_chunks * chunk / rate_hz,
         step_s=step_s,
     )
@@ -158,13 +158,13 @@ class JointSums:
         positions, turn; m is the number of usable ones.
         """
         width = params.window_chunks
-        found = np.zeros((len(starts), 11))
+        solved = np.zeros((len(starts), 11))
         ridge = (params.noise_mps2 / params.place_sd_m) ** 2 / (chunk * width)
         used = _solve_windows(
             self.AA, self.BB, self.AB, self.ok, starts, width, params.least_chunks, chunk, params.least_power,
-            ridge, found,
+            ridge, solved,
         )  # fmt: skip
-        return found[:used]
+        return solved[:used]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -244,7 +244,7 @@ def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
         for i in range(6):
             N[i, i] += ridge
         _solve_six(N, r)
-        along = across = upright = own = other = 0.0
+        along = lateral = upright = own = second = 0.0
         for i in range(4):
             a = r[i] if i < 3 else 1.0
             b = r[3 + i] if i < 3 else 1.0
@@ -252,12 +252,12 @@ def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
                 a2 = r[j] if j < 3 else 1.0
                 b2 = r[3 + j] if j < 3 else 1.0
                 along += a * AB[0, i, j] * b2
-                across += a * AB[1, i, j] * b2
+                lateral += a * AB[1, i, j] * b2
                 upright += a * AB[2, i, j] * b2
                 own += a * AA[i, j] * a2
-                other += b * BB[i, j] * b2
-        turn = np.arctan2(across, along)
-        new = own + other - 2.0 * (np.sqrt(along * along + across * across) + upright)
+                second += b * BB[i, j] * b2
+        turn = np.arctan2(lateral, along)
+        new = own + second - 2.0 * (np.sqrt(along * along + lateral * lateral) + upright)
         for i in range(6):
             new += ridge * r[i] * r[i]
         if cost - new < 1e-7 * new:
@@ -268,7 +268,7 @@ def _fit_places(AA, BB, AB, ridge, turn, N, r):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, ridge, found):  # type: ignore[no-untyped-def]
+def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, ridge, solved):  # type: ignore[no-untyped-def]
     """Write middle (chunks), lag (samples), certain, residual, positions of each window; returns their
     number.
     """
@@ -306,21 +306,25 @@ def _solve_windows(AA, BB, AB, ok, starts, width, least, chunk, least_power, rid
                 if j < best:
                     best, start = j, turn
         warm = start
-        at = 0
+        least_lag = 0
         for k in range(lags):
             cost[k], _ = _fit_places(wa, wb[k], wab[k], ridge, start, N, places[k])
-            if cost[k] < cost[at]:
-                at = k
-        inside = 0 < at < lags - 1
+            if cost[k] < cost[least_lag]:
+                least_lag = k
+        inside = 0 < least_lag < lags - 1
         shift = 0.0
         if inside:
-            shift = 0.5 * (cost[at - 1] - cost[at + 1]) / (cost[at - 1] - 2.0 * cost[at] + cost[at + 1])
-        found[used, 0] = first + 0.5 * width
-        found[used, 1] = at - mid + shift
-        found[used, 2] = inside
-        found[used, 3] = np.sqrt(max(cost[at], 0.0)) / size
+            shift = (
+                0.5
+                * (cost[least_lag - 1] - cost[least_lag + 1])
+                / (cost[least_lag - 1] - 2.0 * cost[least_lag] + cost[least_lag + 1])
+            )
+        solved[used, 0] = first + 0.5 * width
+        solved[used, 1] = least_lag - mid + shift
+        solved[used, 2] = inside
+        solved[used, 3] = np.sqrt(max(cost[least_lag], 0.0)) / size
         for i in range(6):
-            found[used, 4 + i] = places[at, i]
-        found[used, 10] = start
+            solved[used, 4 + i] = places[least_lag, i]
+        solved[used, 10] = start
         used += 1
     return used

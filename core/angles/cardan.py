@@ -42,7 +42,7 @@ def compute_headings(orientations: Oriented) -> dict[str, Floats]:
     The pelvis heading is that of its medio-lateral axis, as in the decomposition above; a foot heading that
     of the foot's medio-lateral axis.
     """
-    found: dict[str, Floats] = {}
+    headings: dict[str, Floats] = {}
     for segment, axis in COURSE_AXES.items():
         if segment not in orientations.q:
             continue
@@ -52,5 +52,5 @@ def compute_headings(orientations: Oriented) -> dict[str, Floats]:
             x, y, _ = rotate(orientations.q[segment][part], np.array(axis)).T
             course[part] = np.arctan2(y, x)
         course[ok], course[~ok] = np.unwrap(course[ok]), np.nan
-        found[segment] = course
-    return found
+        headings[segment] = course
+    return headings

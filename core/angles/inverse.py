@@ -41,7 +41,7 @@ def leg_orientations(angles: Mapping[str, Floats], side: Side) -> dict[Segment, 
     ----------
     angles : "hip_flexion" … "ankle_rotation" → (n,) rad; missing angles are 0.
     """
-    found: dict[Segment, Floats] = {}
+    orientations: dict[Segment, Floats] = {}
     q = np.array([1.0, 0.0, 0.0, 0.0])
     for joint, _, distal in list_leg_joints(side):
         a, b, c = np.broadcast_arrays(
@@ -51,5 +51,5 @@ def leg_orientations(angles: Mapping[str, Floats], side: Side) -> dict[Segment, 
             )
         )
         q = multiply(q, multiply(multiply(about(2, a), about(0, b)), about(1, c)))
-        found[distal] = q
-    return found
+        orientations[distal] = q
+    return orientations

@@ -20,27 +20,27 @@ from sagittal.core.rotation import compiled, wrap_angle
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _measure(q, known, pelvis, ends, sign, zero, out):  # type: ignore[no-untyped-def]
+def _measure(q, is_known, pelvis, ends, sign, zero, out):  # type: ignore[no-untyped-def]
     """Write angles (T, 2 + 3 J) of segments q (T, n, 4); `ends` (J, 2), `sign` (J, 3), pelvis −1 = none."""
     half = np.sqrt(0.5)
     first = 2 if pelvis >= 0 else 0
     for k in range(q.shape[0]):
         if pelvis >= 0:
             out[k, 0] = out[k, 1] = np.nan
-            if known[k, pelvis]:
+            if is_known[k, pelvis]:
                 # in axes of neutral standing: its inverse is a quarter turn about −x
                 w, x, y, z = q[k, pelvis]
                 a, b, c, d = half * (w + x), half * (x - w), half * (y + z), half * (z - y)
                 out[k, 0] = -atan2(2.0 * (b * c + a * d), 1.0 - 2.0 * (b * b + d * d))
                 out[k, 1] = -asin(min(1.0, max(-1.0, -2.0 * (c * d - a * b))))
         for j in range(ends.shape[0]):
-            here, there = ends[j, 0], ends[j, 1]
+            proximal, distal = ends[j, 0], ends[j, 1]
             for c in range(3):
                 out[k, first + 3 * j + c] = np.nan
-            if not (known[k, here] and known[k, there]):
+            if not (is_known[k, proximal] and is_known[k, distal]):
                 continue
-            a0, a1, a2, a3 = q[k, here]
-            b0, b1, b2, b3 = q[k, there]
+            a0, a1, a2, a3 = q[k, proximal]
+            b0, b1, b2, b3 = q[k, distal]
             w, x, y, z = compiled.multiply(a0, -a1, -a2, -a3, b0, b1, b2, b3)
             flexion = atan2(-2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z))
             frontal = asin(min(1.0, max(-1.0, 2.0 * (y * z + w * x))))
@@ -69,18 +69,19 @@ class AngleKernel:
     estimated: tuple[bool, ...]
 
     @classmethod
-    def between(cls, worn: Sequence[Segment], figure: Sequence[Segment] = ()) -> AngleKernel:
-        """All angles between these segments; the columns to measure are those of `worn`, then of `figure`.
+    def between(cls, measured: Sequence[Segment], figure: Sequence[Segment] = ()) -> AngleKernel:
+        """All angles between these segments; the columns to measure are those of `measured`, then of
+        `figure`.
 
         Parameters
         ----------
-        worn : segments with a sensor; angles between two of them are measured.
+        measured : segments with a sensor; angles between two of them are measured.
         figure : segments of a pose estimate with more segments; angles that lack a sensor are computed from
         it, both
             ends.
         """
-        sources = [({s: i for i, s in enumerate(worn)}, False),
-                   ({s: len(worn) + i for i, s in enumerate(figure)}, True)]  # fmt: skip
+        sources = [({s: i for i, s in enumerate(measured)}, False),
+                   ({s: len(measured) + i for i, s in enumerate(figure)}, True)]  # fmt: skip
         names: list[str] = []
         estimated: list[bool] = []
         ends, sign, pelvis = [], [], -1
@@ -109,8 +110,8 @@ class AngleKernel:
             tuple(estimated),
         )
 
-    def measure(self, q: Floats, known: Bools, zero: Floats | None = None) -> Floats:
-        """Angles (T, names) in rad, −π to π, of segments q (T, n, 4) to W; NaN where not `known` (T, n).
+    def measure(self, q: Floats, is_known: Bools, zero: Floats | None = None) -> Floats:
+        """Angles (T, names) in rad, −π to π, of segments q (T, n, 4) to W; NaN where not `is_known` (T, n).
 
         Parameters
         ----------
@@ -118,7 +119,7 @@ class AngleKernel:
         """
         out = np.empty((len(q), len(self.names)))
         _measure(
-            np.ascontiguousarray(q), np.ascontiguousarray(known), self.pelvis, self.ends, self.sign,
+            np.ascontiguousarray(q), np.ascontiguousarray(is_known), self.pelvis, self.ends, self.sign,
             np.zeros(len(self.names)) if zero is None else zero, out,
         )  # fmt: skip
         return out

@@ -54,12 +54,12 @@ def measure_angles(
     """
     kernel = AngleKernel.between(tuple(orientations.q), () if poses is None else tuple(poses.q))
     standing = kernel.measure(*_stack(orientations, poses, index_window(zero, orientations.rate_hz)))
-    known = [bool(x.any()) for x in np.isfinite(standing).T]
+    is_known = [bool(x.any()) for x in np.isfinite(standing).T]
     offset = mean_angles(standing)
-    kept = [i for i, x in enumerate(known) if x]
+    retained = [i for i, x in enumerate(is_known) if x]
     n = len(orientations.t_s)
     held: dict[int, Floats] = {
-        i: make_room(n) for i in kept if not (kernel.estimated[i] and kernel.names[i] in dropped)
+        i: make_room(n) for i in retained if not (kernel.estimated[i] and kernel.names[i] in dropped)
     }
     locked = np.empty((n, len(kernel.names)), np.bool_)
     for part in cut_blocks(n):
@@ -69,7 +69,7 @@ def measure_angles(
             angle[part] = subtract_zero(raw[:, i], offset[i])
         give_pages_back((*held.values(), *(() if poses is None else poses.q.values())))
     notices = _find_missing_joints(orientations, kernel) + _find_gimbal(locked, kernel, orientations.t_s)
-    for name in sorted(name for name, x in zip(kernel.names, known, strict=True) if not x):
+    for name in sorted(name for name, x in zip(kernel.names, is_known, strict=True) if not x):
         message = Message(
             "{name}: no angle, because its sensors have no signal during quiet standing ({zero:.1f} to "
             "{zero2:.1f} s) and the zero is undefined.",
@@ -81,9 +81,9 @@ def measure_angles(
     return JointAngles(
         orientations.t_s,
         {kernel.names[i]: angle for i, angle in held.items()},
-        {kernel.names[i]: float(offset[i]) for i in kept},
+        {kernel.names[i]: float(offset[i]) for i in retained},
         notices=tuple(notices),
-        diagnostics={"estimated": tuple(kernel.names[i] for i in kept if kernel.estimated[i])},
+        diagnostics={"estimated": tuple(kernel.names[i] for i in retained if kernel.estimated[i])},
         zero=posture,
         standing_deg=dict(standing_deg or {}) if posture == "standing" else {},
         headings=compute_headings(orientations),
@@ -95,14 +95,14 @@ def _stack(orientations: Orientations, poses: Poses | None, part: slice) -> tupl
     slice.
     """
     q = [x[part] for x in orientations.q.values()]
-    known = [orientations.valid[s][part] for s in orientations.q]
+    validity = [orientations.valid[s][part] for s in orientations.q]
     if poses is not None:
         q += [x[part] for x in poses.q.values()]
-        known += [poses.valid[part]] * len(poses.q)
+        validity += [poses.valid[part]] * len(poses.q)
     if not q:
         n = len(orientations.t_s[part])
         return np.empty((n, 0, 4)), np.empty((n, 0), np.bool_)
-    return np.stack(q, axis=1), np.stack(known, axis=1)
+    return np.stack(q, axis=1), np.stack(validity, axis=1)
 
 
 def _find_missing_joints(orientations: Orientations, kernel: AngleKernel) -> list[Notice]:

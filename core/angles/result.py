@@ -67,5 +67,5 @@ class JointAngles:
     @property
     def estimated(self) -> frozenset[str]:
         """Angles, with their side, that are not measured by two sensors."""
-        told = self.diagnostics.get("estimated", ())
-        return frozenset(str(name) for name in told) if isinstance(told, (tuple, list)) else frozenset()
+        names = self.diagnostics.get("estimated", ())
+        return frozenset(str(name) for name in names) if isinstance(names, (tuple, list)) else frozenset()

@@ -75,18 +75,18 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
     fixed = list_fixed(poses) & estimated & set(angles.zero_offset)
     bad = [f for f in poses.health if f.verdict == "bad"]
     out = {name for f in bad for name in _concerned(f, estimated) if name in angles.angles} - fixed
-    kept = {name: x for name, x in angles.angles.items() if name not in out | fixed}
+    retained = {name: x for name, x in angles.angles.items() if name not in out | fixed}
     for f in bad:
         side = _foot_side(f.of)
         if f.name == "gap_s" and f.bad is not None and side is not None and FOOT[side] in orientations.valid:
             long = _after_gaps(orientations, side, f.bad)
-            for name in kept:
+            for name in retained:
                 if name in estimated and name.endswith(f"_{SUFFIX[side]}"):
-                    kept[name] = np.where(long, np.nan, kept[name])
+                    retained[name] = np.where(long, np.nan, retained[name])
     modelled = estimator is not None and estimator.leg_model
     bounds = {
         name: wrap_angle(float(-angles.zero_offset[name]))
-        for name in kept
+        for name in retained
         if modelled and name in estimated and name.startswith("knee_flexion")
     }
     notices = angles.notices
@@ -100,7 +100,7 @@ def withhold(angles: JointAngles, poses: Poses, orientations: Oriented) -> Joint
         notices = (*notices, Notice("angles_withheld", message))
     return replace(
         angles,
-        angles=kept,
+        angles=retained,
         withheld={name: BAD if name in out else FIXED for name in sorted(out | fixed)},
         bounds=bounds,
         notices=notices,
@@ -114,16 +114,16 @@ def withhold_at_slips(angles: JointAngles, doubtful: Mapping[Segment, Window]) -
     ----------
     doubtful : sensor → period, s from recording start (core/agreement).
     """
-    kept = dict(angles.angles)
+    retained = dict(angles.angles)
     for side in SIDES:
         for joint, *ends in list_leg_joints(side):
             out = np.zeros(len(angles.t_s), np.bool_)
             for start, end in (doubtful[s] for s in ends if s in doubtful):
                 out |= (angles.t_s >= start) & (angles.t_s <= end)
             for base, _, _ in SIGNS[joint]:
-                if (name := f"{base}_{SUFFIX[side]}") in kept:
-                    kept[name] = np.where(out, np.nan, kept[name])
-    return replace(angles, angles=kept)
+                if (name := f"{base}_{SUFFIX[side]}") in retained:
+                    retained[name] = np.where(out, np.nan, retained[name])
+    return replace(angles, angles=retained)
 
 
 def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
@@ -144,7 +144,7 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
     if not out:
         return posed
     whose = "both feet" if len(out) > 1 else f"the {out[0]} foot"
-    why, todo = (
+    reason, todo = (
         ("the path does not fit the sensors", "Check sides, segments, mounting and lost samples")
         if chain
         else ("the path does not fit its rests on the floor", "Fasten the sensor and check for lost samples")
@@ -152,7 +152,7 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
     message = Message(
         "Distances of {whose} are not reported: {why}. {todo}, then record again.",
         whose=whose,
-        why=why,
+        why=reason,
         todo=todo,
     )
     notices = (*posed.poses.notices, Notice("distances_withheld", message))
@@ -165,18 +165,18 @@ def withhold_distances(posed: PoseEstimate) -> PoseEstimate:
 
 def _concerned(f: HealthFinding, estimated: frozenset[str]) -> Iterator[str]:
     """Names of the angles affected by a bad health check."""
-    of = f.of or ""
+    subject = f.of or ""
     if f.name in OF_JOINT or f.name in OF_SEGMENT:
-        ends = set(of.split("-"))
+        ends = set(subject.split("-"))
         for side in SIDES:
             for joint, proximal, distal in list_leg_joints(side):
                 # of a joint both ends are named, of a segment one
                 if ends <= {proximal, distal}:
                     yield from (f"{base}_{SUFFIX[side]}" for base, _, _ in SIGNS[joint])
-        if of == "pelvis":
+        if subject == "pelvis":
             yield from ("pelvis_tilt", "pelvis_obliquity")
     elif f.name in OF_LEG:
-        yield from (name for name in estimated if name.endswith(f"_{of[-1:]}"))
+        yield from (name for name in estimated if name.endswith(f"_{subject[-1:]}"))
     elif f.name in OF_TAKE:
         yield from estimated
 
@@ -188,8 +188,8 @@ def list_fixed(poses: Poses) -> frozenset[str]:
     return frozenset(x for v in variables for x in (v, *(f"{v}_{end}" for end in SUFFIX.values())))
 
 
-def _foot_side(of: str | None) -> Side | None:
-    return next((side for side in SIDES if FOOT[side] == of), None)
+def _foot_side(subject: str | None) -> Side | None:
+    return next((side for side in SIDES if FOOT[side] == subject), None)
 
 
 def _after_gaps(orientations: Oriented, side: Side, least_s: float) -> np.ndarray:

@@ -142,12 +142,12 @@ def ask_joint(
     (6,), whose covariance (6, 6) keeps the solution near them, after which the nuisance parameters are
     marginalised.
     """
-    seen = first.usable & second.usable
-    n = int(np.count_nonzero(seen))
+    both_usable = first.usable & second.usable
+    n = int(np.count_nonzero(both_usable))
     if n < params.least_s * rate_hz:
         return None
-    A, B = first.M[seen], second.M[seen]
-    wander_a, wander_b = first.wander[seen], second.wander[seen]
+    A, B = first.M[both_usable], second.M[both_usable]
+    wander_a, wander_b = first.wander[both_usable], second.wander[both_usable]
     ka, kb = wander_a.shape[2], wander_b.shape[2]
     nuisance_sd = np.array([params.turn_sd, *[first.wander_sd] * ka, *[second.wander_sd] * kb])
     prior = np.zeros((ARMS + len(nuisance_sd),) * 2)

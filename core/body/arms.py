@@ -142,9 +142,9 @@ def measure_arms(
     for s, guess in usual.guesses.items():
         part = usual.part(s)
         moved = any(s in joint for joint in heard)
-        taken = (ACROSS if name_kind(s) == "thigh" else np.ones(ARM, np.bool_)) & moved
-        place = np.where(taken, fitted[part], guess)
-        sensors[s] = SensorPlace(guess, place, np.where(taken, fitted_sd[part], usual.sd[part]), taken)
+        observed = (ACROSS if name_kind(s) == "thigh" else np.ones(ARM, np.bool_)) & moved
+        place = np.where(observed, fitted[part], guess)
+        sensors[s] = SensorPlace(guess, place, np.where(observed, fitted_sd[part], usual.sd[part]), observed)
     joints = {}
     for joint, guess in usual.nominal.items():
         part = usual.part(joint)
@@ -173,7 +173,7 @@ class _Usual:
     @classmethod
     def of(cls, body: BodyModel, segments: Sequence[Segment], params: ArmParams) -> _Usual:
         """Nominal values from the body model."""
-        nominal = {j: above for j, (above, _) in joint_places(body).items() if set(j) <= set(segments)}
+        nominal = {j: centre for j, (centre, _) in joint_places(body).items() if set(j) <= set(segments)}
         guesses = {s: sensor_place(s, body) for s in segments}
         mean = np.concatenate((*guesses.values(), *nominal.values()))
         sd = np.concatenate(
@@ -245,14 +245,14 @@ def _hear_joints(
         to_arms = usual.find_arms(joint)
         of_arms = to_arms[:, :-1]
         spread = of_arms @ usual.spread(params) @ of_arms.T
-        found = ask_joint(sides[joint[0]], sides[joint[1]], of_arms @ usual.mean, spread, rate_hz, params)
-        if found is None:
+        evidence = ask_joint(sides[joint[0]], sides[joint[1]], of_arms @ usual.mean, spread, rate_hz, params)
+        if evidence is None:
             continue
-        misfits[joint] = found.misfit
-        if found.misfit <= params.worst_misfit:
+        misfits[joint] = evidence.misfit
+        if evidence.misfit <= params.worst_misfit:
             heard.add(joint)
-            N += to_arms.T @ found.L @ to_arms
-            b += to_arms.T @ found.h
+            N += to_arms.T @ evidence.L @ to_arms
+            b += to_arms.T @ evidence.h
     return misfits, heard
 
 

@@ -56,14 +56,14 @@ class Choice:
 
 def list_possible_estimators(segments: Iterable[Segment]) -> tuple[Estimator, ...]:
     """Estimators that can run on these segments, the default one first."""
-    worn = set(segments)
-    found = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(worn)]
-    if ERKF.runs_on(worn):
+    instrumented = set(segments)
+    estimators = [e.name for e in (L7S_3I, L7S_2I) if e.runs_on(instrumented)]
+    if ERKF.runs_on(instrumented):
         # every angle of a whole body is measured; of one leg it is, but the other then has none at all
-        found.insert(0 if worn >= set(WHOLE) else len(found), ERKF.name)
-    if ORIENTATIONS_ONLY.runs_on(worn):
-        found.append(ORIENTATIONS_ONLY.name)
-    return tuple(found)
+        estimators.insert(0 if instrumented >= set(WHOLE) else len(estimators), ERKF.name)
+    if ORIENTATIONS_ONLY.runs_on(instrumented):
+        estimators.append(ORIENTATIONS_ONLY.name)
+    return tuple(estimators)
 
 
 def choose(
@@ -80,24 +80,24 @@ def choose(
     ------
     EstimationError `estimator_impossible` if the requested one needs sensors that are unavailable.
     """
-    worn = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
-    share = {s: float(np.mean(x.valid)) for s, x in worn.items()}
+    candidates = {s: calibrated.recording.sensors[s] for s in WHOLE if s in calibrated.recording.sensors}
+    share = {s: float(np.mean(x.valid)) for s, x in candidates.items()}
     slipped = {n.sensor for n in calibrated.recording.notices if n.code == "sensor_slipped"}
     need = {s: max(min(least_valid, LEAST_SLIPPED) if s in slipped else least_valid, 1e-9) for s in WHOLE}
     lasting = tuple(s for s in WHOLE if share.get(s, 0.0) >= need[s])
-    failed = tuple(s for s in worn if s not in lasting)
+    failed = tuple(s for s in candidates if s not in lasting)
     working = tuple(s for s in lasting if s in orientations.q)
     if calibrated.calibration.posture == "walking":
         return _without_standing(requested, working, _report_failed(failed, share, need), failed)
-    found = list_possible_estimators(working)
-    if requested != AUTO and requested not in found:
+    possible = list_possible_estimators(working)
+    if requested != AUTO and requested not in possible:
         raise EstimationError("estimator_impossible", _impossible(requested, working))
-    hoped = list_possible_estimators(worn)[:1]
+    hoped = list_possible_estimators(candidates)[:1]
     reduced = None
-    if requested == AUTO and hoped != found[:1]:
+    if requested == AUTO and hoped != possible[:1]:
         reduced = "sensor_failed" if failed else "not_calibrated"
-    order = found if requested == AUTO else (requested,)
-    return Choice(working, failed, found, order, reduced, _report_failed(failed, share, need))
+    order = possible if requested == AUTO else (requested,)
+    return Choice(working, failed, possible, order, reduced, _report_failed(failed, share, need))
 
 
 def _without_standing(

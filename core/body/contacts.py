@@ -25,10 +25,10 @@ def contact_mask(t_s: Floats, ic_s: Sequence[float], tc_s: Sequence[float]) -> B
         return np.ones(len(t_s), bool)
     contact = np.full(len(t_s), not events[0][1])
     starts = np.searchsorted(t_s, [t for t, _ in events])
-    for (start, down), first, (after, landed), past in zip(
+    for (start, down), first, (next_s, landed), past in zip(
         events, starts, [*events[1:], (np.inf, True)], [*starts[1:], len(t_s)], strict=True
     ):
         contact[first:past] = down
         if not down and not landed:
-            contact[max(first, np.searchsorted(t_s, 0.5 * (start + after))) : past] = True
+            contact[max(first, np.searchsorted(t_s, 0.5 * (start + next_s))) : past] = True
     return contact

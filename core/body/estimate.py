@@ -88,18 +88,18 @@ def estimate_poses(
     the next possible one, with a notice `estimator_failed`.
     """
     choice = mounted.choice
-    asked = BY_NAME.get(params.estimator)
+    requested = BY_NAME.get(params.estimator)
     # the point of asking for few sensors by name is what so few tell
-    seen = choice.segments if asked is None or asked.sensors is None else asked.sensors
-    used = tuple(s for s in choice.segments if s in seen)
+    read_segments = choice.segments if requested is None or requested.sensors is None else requested.sensors
+    used = tuple(s for s in choice.segments if s in read_segments)
     take = _Take(mounted, _without(mounted.orientations, set(WHOLE) - set(used)), contacts, params)
     notices, reduced = list(choice.notices), choice.reduced
     if mounted.calibrated.recording.protocol == "treadmill":
         notices.append(Notice("treadmill_belt", ON_A_BELT, severity="info"))
-    made = None
+    estimate = None
     for estimator in choice.order:
         try:
-            made = take.run(estimator, used)
+            estimate = take.run(estimator, used)
             break
         except EstimationError as error:
             if estimator == choice.order[-1]:
@@ -111,13 +111,13 @@ def estimate_poses(
             )
             notices.append(Notice("estimator_failed", message, error.sensor, error.t_s))
             reduced = "estimator_failed"
-    if made is None:
+    if estimate is None:
         # no figure; the notices of what is missing are still wanted
-        made = take.anchored()
-        made = replace(made, poses=replace(made.poses, q={}, p={}, method=NO_FIGURE))
-    if made.feet is None:
+        estimate = take.anchored()
+        estimate = replace(estimate, poses=replace(estimate.poses, q={}, p={}, method=NO_FIGURE))
+    if estimate.feet is None:
         try:
-            made = take.with_feet(made, used)
+            estimate = take.with_feet(estimate, used)
         except EstimationError as error:
             message = Message(
                 "The paths of the feet cannot be estimated, so there are no distances. {message}",
@@ -125,17 +125,17 @@ def estimate_poses(
             )
             notices.append(Notice("foot_paths_failed", message, error.sensor, error.t_s))
     poses = replace(
-        made.poses,
+        estimate.poses,
         reduced=reduced,
-        notices=(*notices, *made.poses.notices),
+        notices=(*notices, *estimate.poses.notices),
         diagnostics={
-            **made.poses.diagnostics,
+            **estimate.poses.diagnostics,
             "requested": params.estimator,
             "sensors": used,
             "possible": choice.possible,
         },
     )
-    return replace(made, poses=poses)
+    return replace(estimate, poses=poses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,14 +217,14 @@ class _Take:
 
     def steps(self) -> dict[Side, Bools]:
         """Samples with each foot still."""
-        found: dict[Side, Bools] = {}
+        still: dict[Side, Bools] = {}
         for side in SIDES:
             acc, gyr, valid = correct_signals(self.calibrated, (FOOT[side],))
             rate = self.calibrated.recording.rate_hz
-            found[side], _ = contact_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate)
-        return found
+            still[side], _ = contact_samples(acc[:, 0], gyr[:, 0], valid[:, 0], rate)
+        return still
 
-    def with_feet(self, made: PoseEstimate, segments: tuple[Segment, ...]) -> PoseEstimate:
+    def with_feet(self, estimate: PoseEstimate, segments: tuple[Segment, ...]) -> PoseEstimate:
         """The same with a separate ErKF for each foot; unchanged without feet.
 
         Raises
@@ -233,14 +233,14 @@ class _Take:
         """
         feet = tuple(FOOT[s] for s in SIDES if FOOT[s] in segments)
         if not feet:
-            return made
+            return estimate
         run = run_erkf(self.calibrated, self.orientations, self.body, feet, self.params.erkf)
         health = tuple(f for f in erkf_health(run) if f.of in feet)
-        known = {(f.name, f.of) for f in made.poses.health}
+        existing = {(f.name, f.of) for f in estimate.poses.health}
         poses = replace(
-            made.poses,
-            health=(*made.poses.health, *(f for f in health if (f.name, f.of) not in known)),
-            notices=(*made.poses.notices, *erkf_notices(run, health)),
+            estimate.poses,
+            health=(*estimate.poses.health, *(f for f in health if (f.name, f.of) not in existing)),
+            notices=(*estimate.poses.notices, *erkf_notices(run, health)),
         )
         tracks = find_segment_tracks(run, in_place=True)
         paths = foot_tracks(run, replace_orientations(run, self.orientations, tracks), self.body, tracks)
@@ -250,16 +250,16 @@ class _Take:
             q={side: lay_aside(q) for side, q in paths.q.items()},
             posture=self.calibrated.calibration.posture,
         )
-        return replace(made, poses=poses, feet=paths)
+        return replace(estimate, poses=poses, feet=paths)
 
 
 def _without(orientations: Orientations, failed: Collection[Segment]) -> Orientations:
-    kept = [s for s in orientations.q if s not in failed]
-    q = {s: orientations.q[s] for s in kept}
+    segments = [s for s in orientations.q if s not in failed]
+    q = {s: orientations.q[s] for s in segments}
     return replace(
         orientations,
         q=LastReading(q) if isinstance(orientations.q, LastReading) else q,
-        valid={s: orientations.valid[s] for s in kept},
+        valid={s: orientations.valid[s] for s in segments},
     )
 
 

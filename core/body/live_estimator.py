@@ -79,5 +79,5 @@ class LivePoseEstimator(Protocol):
 
 def list_worn_feet(segments: Iterable[Segment]) -> tuple[Segment, ...]:
     """Feet among these segments, left first."""
-    worn = set(segments)
-    return tuple(FOOT[s] for s in SIDES if FOOT[s] in worn)
+    instrumented = set(segments)
+    return tuple(FOOT[s] for s in SIDES if FOOT[s] in instrumented)

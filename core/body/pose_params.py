@@ -37,13 +37,13 @@ class PoseParams:
     least_valid: float = 0.5
 
     def __post_init__(self) -> None:
-        known = get_args(Requested)
-        if self.estimator not in known:
+        choices = get_args(Requested)
+        if self.estimator not in choices:
             raise ParameterError(
                 "unknown_estimator",
                 Message(
                     "'{estimator}' is no estimator; expected one of {known}.",
                     estimator=self.estimator,
-                    known=", ".join(known),
+                    known=", ".join(choices),
                 ),
             )

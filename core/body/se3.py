@@ -49,10 +49,10 @@ def _slopes(square, a, b):  # type: ignore[no-untyped-def]
 
 
 @inner_njit(**UNCOUNTED)
-def move_pose(R, p, xi, at, work):  # type: ignore[no-untyped-def]
-    """T ← T Exp(ξ) of a pose R (3, 3), p (3,); ξ is xi[at : at + 6], work (3, 3, 3) of scratch."""
-    x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]
-    r, s, t = xi[at], xi[at + 1], xi[at + 2]
+def move_pose(R, p, xi, offset, work):  # type: ignore[no-untyped-def]
+    """T ← T Exp(ξ) of a pose R (3, 3), p (3,); ξ is xi[offset : at + 6], work (3, 3, 3) of scratch."""
+    x, y, z = xi[offset + 3], xi[offset + 4], xi[offset + 5]
+    r, s, t = xi[offset], xi[offset + 1], xi[offset + 2]
     square = x * x + y * y + z * z
     a, b = _quotients(square)
     # J_l ρ = ρ + a φ × ρ + b φ × (φ × ρ)
@@ -65,7 +65,7 @@ def move_pose(R, p, xi, at, work):  # type: ignore[no-untyped-def]
     for c in range(3):
         p[c] += R[c, 0] * r + R[c, 1] * s + R[c, 2] * t
     turned = work[0]
-    skew_polynomial(xi[at + 3 : at + 6], 1.0, 1.0 - square * b, a, turned)
+    skew_polynomial(xi[offset + 3 : offset + 6], 1.0, 1.0 - square * b, a, turned)
     multiply3(R, turned, work[1])
     for i in range(3):
         for j in range(3):
@@ -74,18 +74,18 @@ def move_pose(R, p, xi, at, work):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def right_jacobian(xi, at, same, cross):  # type: ignore[no-untyped-def]
-    """Write Φ(ξ) = [[same, cross], [0, same]], blocks (3, 3); ξ is xi[at : at + 6].
+def right_jacobian(xi, offset, same, cross):  # type: ignore[no-untyped-def]
+    """Write Φ(ξ) = [[same, cross], [0, same]], blocks (3, 3); ξ is xi[offset : at + 6].
 
     `same` is J_r(φ) = 1 − a [φ]× + b [φ]×², `cross` its derivative along ρ: the series of Φ differentiated
     term by term, as the off-diagonal block of ad(ξ)^i is the derivative of [φ]×^i.
     """
-    x, y, z = xi[at + 3], xi[at + 4], xi[at + 5]
-    r, s, t = xi[at], xi[at + 1], xi[at + 2]
+    x, y, z = xi[offset + 3], xi[offset + 4], xi[offset + 5]
+    r, s, t = xi[offset], xi[offset + 1], xi[offset + 2]
     square, along = x * x + y * y + z * z, x * r + y * s + z * t
     a, b = _quotients(square)
     slope_a, slope_b = _slopes(square, a, b)
-    skew_polynomial(xi[at + 3 : at + 6], 1.0, -a, b, same)
+    skew_polynomial(xi[offset + 3 : offset + 6], 1.0, -a, b, same)
     # −a [ρ]× − slope_a (φ·ρ) [φ]×
     c, d = a, slope_a * along
     i, j, k = c * r + d * x, c * s + d * y, c * t + d * z
@@ -95,9 +95,9 @@ def right_jacobian(xi, at, same, cross):  # type: ignore[no-untyped-def]
     cross[0, 0] = trace + 2.0 * b * x * r + d * x * x
     cross[1, 1] = trace + 2.0 * b * y * s + d * y * y
     cross[2, 2] = trace + 2.0 * b * z * t + d * z * z
-    both = b * (x * s + y * r) + d * x * y
-    cross[0, 1], cross[1, 0] = both + k, both - k
-    both = b * (x * t + z * r) + d * x * z
-    cross[0, 2], cross[2, 0] = both - j, both + j
-    both = b * (y * t + z * s) + d * y * z
-    cross[1, 2], cross[2, 1] = both + i, both - i
+    symmetric = b * (x * s + y * r) + d * x * y
+    cross[0, 1], cross[1, 0] = symmetric + k, symmetric - k
+    symmetric = b * (x * t + z * r) + d * x * z
+    cross[0, 2], cross[2, 0] = symmetric - j, symmetric + j
+    symmetric = b * (y * t + z * s) + d * y * z
+    cross[1, 2], cross[2, 1] = symmetric + i, symmetric - i

@@ -89,10 +89,10 @@ def contact_samples(
     quietest = np.zeros(len(still), np.bool_)
     for start, stop in find_runs((loud == least) & (loud <= rule.loudest) & ~still):
         k = (start + stop - 1) // 2
-        before, after = max(0, k - swing), min(len(still), k + swing)
+        lower, upper = max(0, k - swing), min(len(still), k + swing)
         window = slice(max(0, k - reach), k + reach + 1)
-        slow = turning[window].max() <= rule.share * turning[before:after].max()
-        if slow and swings[k] > swings[before] and swings[after] > swings[k]:
+        slow = turning[window].max() <= rule.share * turning[lower:upper].max()
+        if slow and swings[k] > swings[lower] and swings[upper] > swings[k]:
             quietest[window] = True
     return np.asarray(still | quietest), np.where(quietest & ~still, turning, 0.0)
 

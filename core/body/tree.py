@@ -136,18 +136,18 @@ class ImuTree:
                             LONGEST_M=LONGEST_M,
                         ),
                     )
-            part, other = group[joint.proximal], group[joint.distal]
-            if part == other:
+            part, merged = group[joint.proximal], group[joint.distal]
+            if part == merged:
                 raise EstimationError(
                     "joint_loop",
                     Message("{name} closes a loop; a tree has one way to each IMU.", name=joint.name),
                 )
-            group = [part if g == other else g for g in group]
+            group = [part if g == merged else g for g in group]
 
     def roots(self) -> list[int]:
         """The first sensor of each connected part."""
-        below = {j.distal for j in self.joints}
-        return [i for i in range(len(self.imus)) if i not in below]
+        children = {j.distal for j in self.joints}
+        return [i for i in range(len(self.imus)) if i not in children]
 
     def forward(self) -> Floats:
         """Anterior axes (n, 3) of the segments in sensor axes."""
@@ -236,10 +236,10 @@ def person_tree(
     place = np.stack([(places or {}).get(s, sensor_place(s, body)) for s in segments])
     index = {s: i for i, s in enumerate(segments)}
     joints = []
-    for (proximal, distal), (above, below) in joint_places(body).items():
+    for (proximal, distal), (centre_proximal, centre_distal) in joint_places(body).items():
         if proximal not in index or distal not in index:
             continue
-        above = (centres or {}).get((proximal, distal), above)
+        centre_proximal = (centres or {}).get((proximal, distal), centre_proximal)
         i, j = index[proximal], index[distal]
         to_i, to_j = to_matrix(conjugate(q_mount[i])), to_matrix(conjugate(q_mount[j]))
         hinge = distal.startswith(HINGED)
@@ -248,8 +248,8 @@ def person_tree(
                 name=f"{proximal}-{distal}",
                 proximal=i,
                 distal=j,
-                r_proximal=to_i @ (above - place[i]),
-                r_distal=to_j @ (below - place[j]),
+                r_proximal=to_i @ (centre_proximal - place[i]),
+                r_distal=to_j @ (centre_distal - place[j]),
                 e_proximal=to_i[:, 2].copy() if hinge else None,
                 e_distal=to_j[:, 2].copy() if hinge else None,
             )

@@ -120,13 +120,13 @@ def find_anterior_axis(
                 ),
                 sensor=segment,
             )
-        said = ForwardMeasure("declared", written, forward.declared_sd, forward.declared_doubt)
-        return AnteriorAxis(written, "declared", 0.5, measures=(said,), kept=True)
+        measure = ForwardMeasure("declared", written, forward.declared_sd, forward.declared_doubt)
+        return AnteriorAxis(written, "declared", 0.5, measures=(measure,), kept=True)
     if method == "gyro_pca" and segment not in TRUNK:
-        found = _by_gyro(segment, signals, standing, R_vertical, q, walk, written, forward)
+        axis = _by_gyro(segment, signals, standing, R_vertical, q, walk, written, forward)
     else:
-        found = _by_walking(segment, signals, standing, R_vertical, q, walk, written, params, forward)
-    if written is not None and abs(subtract_angles(found.angle, written)) > CONFLICT:
+        axis = _by_walking(segment, signals, standing, R_vertical, q, walk, written, params, forward)
+    if written is not None and abs(subtract_angles(axis.angle, written)) > CONFLICT:
         raise CalibrationError(
             "calibration_sign_conflict",
             Message(
@@ -135,12 +135,12 @@ def find_anterior_axis(
                 "sensor.",
                 segment=segment,
                 declared=declared,
-                abs=abs(degrees(subtract_angles(found.angle, written))),
+                abs=abs(degrees(subtract_angles(axis.angle, written))),
                 CONFLICT=degrees(CONFLICT),
             ),
             sensor=segment,
         )
-    return found
+    return axis
 
 
 def _by_walking(
@@ -233,33 +233,33 @@ def list_axis_measures(
     # walking gives a trunk no sagittal axis of turning
     if segment in TRUNK or pca.rho < SINGLE_AXIS:
         return tuple(heard), None
-    across = nearest_sign(-pca.gamma, angle)
-    heard.append(ForwardMeasure("gyro_pca", across, params.pca_sd, params.pca_doubt))
+    flexion = nearest_sign(-pca.gamma, angle)
+    heard.append(ForwardMeasure("gyro_pca", flexion, params.pca_sd, params.pca_doubt))
     clear = pca.rho >= GOOD_AXIS
     return tuple(heard), (
-        ForwardMeasure("mirror", across, params.mirror_sd, params.pca_doubt) if clear else None
+        ForwardMeasure("mirror", flexion, params.mirror_sd, params.pca_doubt) if clear else None
     )
 
 
 def weigh_axes(
-    found: Mapping[Segment, AnteriorAxis], joints: Sequence[JointMeasure], params: ForwardParams
+    axes: Mapping[Segment, AnteriorAxis], joints: Sequence[JointMeasure], params: ForwardParams
 ) -> dict[Segment, AnteriorAxis]:
     """Estimate the forward axes of all sensors jointly, with their uncertainty and a notice if it is
     large.
     """
-    mirrors = {s: f.mirror for s, f in found.items() if f.mirror is not None}
-    weighed = weigh_forward_axes({s: f.measures for s, f in found.items()}, joints, mirrors)
+    mirrors = {s: f.mirror for s, f in axes.items() if f.mirror is not None}
+    weighed = weigh_forward_axes({s: f.measures for s, f in axes.items()}, joints, mirrors)
     better = {}
-    for s, f in found.items():
+    for s, f in axes.items():
         w = weighed[s]
         angle = f.angle if f.kept else w.angle
         votes = [
             {"source": v.source, "off_rad": subtract_angles(v.angle, angle), "share": v.share}
             for v in w.votes
         ]
-        told = (_tell_uncertain(s, w.sd, params.tell_sd),) if w.sd > params.tell_sd else ()
+        uncertain = (_tell_uncertain(s, w.sd, params.tell_sd),) if w.sd > params.tell_sd else ()
         better[s] = replace(
-            f, angle=angle, sd=w.sd, notices=f.notices + told, facts={**f.facts, "votes": votes}
+            f, angle=angle, sd=w.sd, notices=f.notices + uncertain, facts={**f.facts, "votes": votes}
         )
     return better
 
@@ -316,8 +316,10 @@ def _by_gyro(
                 sensor=segment,
             ),
         )
-    said = ForwardMeasure("gyro_pca", angle, forward.pca_sd, forward.pca_doubt)
-    return AnteriorAxis(angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho}, measures=(said,), kept=True)
+    measure = ForwardMeasure("gyro_pca", angle, forward.pca_sd, forward.pca_doubt)
+    return AnteriorAxis(
+        angle, "gyro_pca", axis.rho, notices, {"rho": axis.rho}, measures=(measure,), kept=True
+    )
 
 
 def _signed(

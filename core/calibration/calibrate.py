@@ -132,18 +132,18 @@ def calibrate(recording: UniformRecording, params: CalibrationParams | None = No
     left = drop_pauses(rests, moving, recording.rate_hz)
     while left:
         zero = choose_rest(left, moving, recording.rate_hz)
-        found, ahead = _calibrate_at(recording, rests, zero, moving, params, movements)
+        calibrated, ahead = _calibrate_at(recording, rests, zero, moving, params, movements)
         if ahead < LEG_AHEAD:
-            return found
+            return calibrated
         left = tuple(r for r in left if not (r[0] <= zero[0] and zero[1] <= r[1]))
     paused = SignalError("no_standing", NO_STANDING, t_s=rests[0][0])
     return _from_walking(recording, rests, params, paused)
 
 
 def _from_walking(
-    recording: UniformRecording, rests: tuple[Window, ...], params: CalibrationParams, why: SignalError
+    recording: UniformRecording, rests: tuple[Window, ...], params: CalibrationParams, reason: SignalError
 ) -> CalibratedRecording:
-    """Calibrate without standing; `rests` are pauses in walking, `why` is the reason for rejecting them."""
+    """Calibrate without standing; `rests` are pauses in walking, rejected for `reason`."""
     return calibrate_from_walking(
         recording,
         params.walking,
@@ -151,7 +151,7 @@ def _from_walking(
         params.attitude,
         params.from_walking,
         params.method,
-        why,
+        reason,
         rests,
         params.forward,
         params.joint_turns,
@@ -174,27 +174,27 @@ def _calibrate_at(
     turning = turning_mask(recording, biases, q, params.walking) & moving
     parts = straight_parts(moving, turning, rate, params.walking)
     walk, facing = _walk(recording, rests, zero, parts, q, params.heading)
-    found: dict[Segment, AnteriorAxis] = {}
+    axes: dict[Segment, AnteriorAxis] = {}
     failed: list[CalibrationError] = []
     for s, signals in recording.sensors.items():
         declared = recording.mounting.get(s, "")
         try:
-            found[s] = find_anterior_axis(
+            axes[s] = find_anterior_axis(
                 s, signals, standing[s], q[s], walk, declared, params.method, params.heading, params.forward
             )
         except CalibrationError as error:
             failed.append(error)
-    found |= find_functional_axes(recording, movements, standing, q, params.functional, params.forward)
-    failed = [error for error in failed if error.sensor not in found]
-    if not found and failed:
+    axes |= find_functional_axes(recording, movements, standing, q, params.functional, params.forward)
+    failed = [error for error in failed if error.sensor not in axes]
+    if not axes and failed:
         raise failed[0]
-    worn = {s: q[s] for s in found}
-    joints = measure_joint_turns(recording, biases, worn, walk.parts, params.joint_turns)
-    found = weigh_axes(found, joints, params.forward)
+    orientations = {s: q[s] for s in axes}
+    joints = measure_joint_turns(recording, biases, orientations, walk.parts, params.joint_turns)
+    axes = weigh_axes(axes, joints, params.forward)
     notices = [Notice(error.code, error.message, sensor=error.sensor) for error in failed]
-    for f in found.values():
+    for f in axes.values():
         notices += f.notices
-    steps = _straight_steps(found, standing, q, walk)
+    steps = _straight_steps(axes, standing, q, walk)
     if steps is not None and steps < FEW_STEPS:
         message = Message(
             f"Calibration used about {{steps}} straight {plural(steps, 'step', 'steps')}; {{FEW_STEPS}} "
@@ -206,17 +206,17 @@ def _calibrate_at(
     if facing:
         notices.append(_tell_facing(facing, walk.leads))
     calibration = Calibration(
-        segments={s: _mounted(standing[s], f) for s, f in found.items()},
+        segments={s: _mounted(standing[s], f) for s, f in axes.items()},
         rest=rests,
         walking=tuple((a / rate, b / rate) for a, b in parts),
         zero=zero,
         turning=turning,
         method=params.method,
         notices=tuple(notices),
-        diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in found.items()},
+        diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in axes.items()},
         straight_steps=steps,
     )
-    ahead = measure_leg_ahead(_tilts(found, standing, q, parts, params.from_walking.least_s * rate))
+    ahead = measure_leg_ahead(_tilts(axes, standing, q, parts, params.from_walking.least_s * rate))
     return CalibratedRecording(recording, calibration), ahead
 
 
@@ -231,11 +231,11 @@ def _rest_world(
     rest.
     """
     signals = recording.sensors[segment]
-    at = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
+    middle = round(0.5 * (zero[0] + zero[1]) * recording.rate_hz)
     q_rest = from_matrix(R_NEUTRAL @ vertical_frame(standing.up))
     gyr, acc = HeldSeries(signals, "gyr", standing.gyro_bias), HeldSeries(signals, "acc")
     return estimate_orientation(
-        q_rest, at, gyr, acc, signals.valid, recording.rate_hz, standing.rest_norm, params
+        q_rest, middle, gyr, acc, signals.valid, recording.rate_hz, standing.rest_norm, params
     )
 
 
@@ -251,12 +251,12 @@ def _walk(
     direction.
     """
     rate = recording.rate_hz
-    rest = next(r for r in rests if r[0] <= zero[0] and zero[1] <= r[1])
-    first, last = round(rest[0] * rate), round(rest[1] * rate)
+    whole_rest = next(r for r in rests if r[0] <= zero[0] and zero[1] <= r[1])
+    first, last = round(whole_rest[0] * rate), round(whole_rest[1] * rate)
     reach = round(params.reach_s * rate)
-    after = [p for p in parts if p[0] >= last - rate and p[0] <= last + reach]
-    leads = bool(after)
-    near = after or [p for p in reversed(parts) if p[1] <= first + rate and p[1] >= first - reach]
+    following = [p for p in parts if p[0] >= last - rate and p[0] <= last + reach]
+    leads = bool(following)
+    near = following or [p for p in reversed(parts) if p[1] <= first + rate and p[1] >= first - reach]
     mid = round(0.5 * (zero[0] + zero[1]) * rate)
     show = turn_sensors(recording)
     turns = [
@@ -264,10 +264,10 @@ def _walk(
     ]
     facing = turns[0] if turns and abs(turns[0]) > FACING else 0.0
     bearing = [t - (0.0 if facing else turns[0]) for t in turns]
-    other = [r for r in rests if (r[0] > rest[1] if leads else r[1] < rest[0])]
+    other_rests = [r for r in rests if (r[0] > whole_rest[1] if leads else r[1] < whole_rest[0])]
     span = None
-    if other and near:
-        span = (last, round(other[0][0] * rate)) if leads else (round(other[-1][1] * rate), first)
+    if other_rests and near:
+        span = (last, round(other_rests[0][0] * rate)) if leads else (round(other_rests[-1][1] * rate), first)
         if span[1] - span[0] > params.longest_velocity_s * rate:
             span = None
     mask = np.zeros(len(recording.t_s), bool)
@@ -278,12 +278,12 @@ def _walk(
     if trunk is not None:
         up = rotate(q[trunk], recording.sensors[trunk].acc)[:, 2]
         steps_s = [step_time(up[a:b], rate) for a, b in near]
-    return CalibrationWalk(rest, leads, near, bearing, span, mask, steps_s, rate), facing
+    return CalibrationWalk(whole_rest, leads, near, bearing, span, mask, steps_s, rate), facing
 
 
 def _tell_facing(turn: float, leads: bool) -> Notice:
     """Notice that standing and walking directions differ, rad; `leads`: standing precedes the walk."""
-    between, todo = (
+    order, todo = (
         ("standing and walking", "Start straight ahead from standing where possible.")
         if leads
         else ("walking and standing", "Stand still where the walk ends before turning where possible.")
@@ -291,7 +291,7 @@ def _tell_facing(turn: float, leads: bool) -> Notice:
     message = Message(
         "The person turned by {abs:.0f}° between {between}; forward is where they stood facing. {todo}",
         abs=abs(degrees(turn)),
-        between=between,
+        between=order,
         todo=todo,
     )
     return Notice("facing_not_walking", message, severity="info")
@@ -309,7 +309,7 @@ def _mounted(standing: SensorAtRest, found: AnteriorAxis) -> SegmentCalibration:
 
 
 def _tilts(
-    found: Mapping[Segment, AnteriorAxis],
+    axes: Mapping[Segment, AnteriorAxis],
     standing: Mapping[Segment, SensorAtRest],
     q: Mapping[Segment, Floats],
     parts: list[Part],
@@ -319,7 +319,7 @@ def _tilts(
     if sum(b - a for a, b in parts) < least:
         return {}
     tilts = {}
-    for s, f in found.items():
+    for s, f in axes.items():
         up = [find_vertical(q[s][a:b]) for a, b in parts]
         mean = np.concatenate(up).mean(axis=0)[None]
         R = about_vertical(-f.angle) @ vertical_frame(standing[s].up)

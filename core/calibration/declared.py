@@ -60,18 +60,18 @@ def propose_mountings(
         free = calibrate(replace(recording, mounting={}), params)
     except (CalibrationError, SignalError):
         return None
-    found: dict[str, str] = {}
+    corrections: dict[str, str] = {}
     evidence = []
     for segment, text in _list_known(declared, free).items():
         off, way = _compare(segment, text, free)
         if way is None:
             continue
-        found[segment] = say_other_way(text, way)
+        corrections[segment] = say_other_way(text, way)
         evidence.append(
             f"The walk shows that the sensor of {segment} sits {degrees(abs(off)):.0f}° otherwise than "
-            f"“{text}” says; “{found[segment]}” fits."
+            f"“{text}” says; “{corrections[segment]}” fits."
         )
-    return SetupRepair("mounting", tuple(evidence), np.inf, mounting=found) if found else None
+    return SetupRepair("mounting", tuple(evidence), np.inf, mounting=corrections) if corrections else None
 
 
 def _list_known(declared: Mapping[str, str], free: CalibratedRecording) -> dict[Segment, str]:
@@ -89,9 +89,9 @@ def _compare(segment: Segment, text: str, free: CalibratedRecording) -> tuple[fl
     """Deviation of the declared axis from the declared direction, rad, and the direction it actually has;
     None if the declaration may be right or no named direction is near.
     """
-    said = read_declared_direction(text)
-    assert said is not None  # noqa: S101 (narrows the type; `propose_mountings` looked)
-    axis, declared = said
+    direction = read_declared_direction(text)
+    assert direction is not None  # noqa: S101 (narrows the type; `propose_mountings` looked)
+    axis, declared = direction
     points = free.calibration.segments[segment].R_segment_sensor @ axis
     # z of a segment is to the right, ways count to the left
     if np.hypot(points[0], points[2]) < STEEPEST_AXIS:

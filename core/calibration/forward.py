@@ -158,10 +158,10 @@ def weigh_forward_axes(
     Segment → the most probable angle, its standard deviation, and the share of every measure.
     """
     heard = [j for j in joints if j.proximal in measures and j.distal in measures]
-    found = {s: _locate(p) for s, p in _find_marginals(measures, heard, mirrors) if s in measures}
+    estimates = {s: _locate(p) for s, p in _find_marginals(measures, heard, mirrors) if s in measures}
     return {
-        s: WeighedForward(angle, sd, tuple(_hear(s, measures[s], heard, mirrors, found)))
-        for s, (angle, sd) in found.items()
+        s: WeighedForward(angle, sd, tuple(_hear(s, measures[s], heard, mirrors, estimates)))
+        for s, (angle, sd) in estimates.items()
     }
 
 
@@ -204,8 +204,8 @@ def _find_marginals(
         pairs.append(pair)
     up = [pairs[0]]
     for level, pair in zip(LEVELS, pairs[1:], strict=False):
-        found = find_links(level)
-        up.append(_scale(pair if found is None else pair * (found[0] @ up[-1] @ found[1].T)))
+        link_pair = find_links(level)
+        up.append(_scale(pair if link_pair is None else pair * (link_pair[0] @ up[-1] @ link_pair[1].T)))
     hips, pelvis, down = find_links(LEVELS[-1]), own("pelvis"), OPEN
     if hips is None:
         yield "pelvis", pelvis
@@ -214,12 +214,12 @@ def _find_marginals(
         down = _scale(hips[0].T @ (pelvis[:, None] * hips[1]))
     for i in reversed(range(len(LEVELS))):
         left, right = LEVELS[i]["left"], LEVELS[i]["right"]
-        both = up[i] * down
-        yield left, both.sum(axis=1)
-        yield right, both.sum(axis=0)
+        joint_density = up[i] * down
+        yield left, joint_density.sum(axis=1)
+        yield right, joint_density.sum(axis=0)
         if i:
-            found = find_links(LEVELS[i - 1])
-            down = OPEN if found is None else _scale(found[0].T @ (pairs[i] * down) @ found[1])
+            link_pair = find_links(LEVELS[i - 1])
+            down = OPEN if link_pair is None else _scale(link_pair[0].T @ (pairs[i] * down) @ link_pair[1])
     chained = {"pelvis", *(s for level in LEVELS for s in level.values())}
     for outside in measures.keys() - chained:
         yield outside, own(outside)
@@ -262,10 +262,10 @@ def _hear(
     measures: Sequence[ForwardMeasure],
     joints: Sequence[JointMeasure],
     mirrors: Mapping[Segment, ForwardMeasure],
-    found: Mapping[Segment, tuple[float, float]],
+    estimates: Mapping[Segment, tuple[float, float]],
 ) -> Iterator[ForwardVote]:
     """Posterior share of each measure of this axis, given the estimates of the other sensors."""
-    angle = found[segment][0]
+    angle = estimates[segment][0]
 
     def vote(source: MeasureName, says: float, sd: float, doubt: float) -> ForwardVote:
         wrong = doubt / (2.0 * pi)
@@ -276,11 +276,11 @@ def _hear(
         yield vote(m.source, m.angle, m.sd, m.doubt)
     for j in joints:
         if segment == j.proximal:
-            yield vote("distal_joint", found[j.distal][0] + j.turn, j.sd, j.doubt)
+            yield vote("distal_joint", estimates[j.distal][0] + j.turn, j.sd, j.doubt)
         elif segment == j.distal:
-            yield vote("proximal_joint", found[j.proximal][0] - j.turn, j.sd, j.doubt)
-    other = next((p[o] for p in LEVELS for s, o in SIDE_PAIRS if p[s] == segment), None)
-    if other is not None and other in found and segment in mirrors and other in mirrors:
-        own, theirs = mirrors[segment], mirrors[other]
-        says = own.angle + theirs.angle - found[other][0]
+            yield vote("proximal_joint", estimates[j.proximal][0] - j.turn, j.sd, j.doubt)
+    opposite = next((p[o] for p in LEVELS for s, o in SIDE_PAIRS if p[s] == segment), None)
+    if opposite is not None and opposite in estimates and segment in mirrors and opposite in mirrors:
+        own, theirs = mirrors[segment], mirrors[opposite]
+        says = own.angle + theirs.angle - estimates[opposite][0]
         yield vote("mirror", says, max(own.sd, theirs.sd), max(own.doubt, theirs.doubt))

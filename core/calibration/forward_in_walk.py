@@ -83,7 +83,7 @@ def find_forward_in_walk(
     """Anterior axis of every sensor whose sign can be determined independently, and notices about the
     others.
     """
-    found: dict[Segment, AnteriorAxis] = {}
+    axes: dict[Segment, AnteriorAxis] = {}
     notices: list[Notice] = []
     pushed: dict[Segment, Floats] = {}
     failed: CalibrationError | None = None
@@ -93,26 +93,26 @@ def find_forward_in_walk(
         by_gyro = method == "gyro_pca" and segment not in TRUNK
         try:
             axis = _find_axis(segment, x, recording, parts, bearing, mask, params, by_gyro)
-            angle, how, own = _sign(segment, axis, recording, x, mask, pushed, params.pendulum)
+            angle, evidence, own = _sign(segment, axis, recording, x, mask, pushed, params.pendulum)
         except CalibrationError as error:
             failed = failed or error
             notices.append(Notice(error.code, error.message, sensor=segment))
             continue
         pushed[segment] = axis.push if np.cos(angle - axis.angle) > 0.0 else -axis.push
         heard, mirror = _list_measures(segment, angle, axis, recording, x, mask, weights)
-        found[segment] = AnteriorAxis(
+        axes[segment] = AnteriorAxis(
             angle,
             method if segment not in TRUNK else "walking_direction",
             axis.share,
             own,
-            {"sign": how},
+            {"sign": evidence},
             measures=heard,
             mirror=mirror,
             kept=axis.seen is None or axis.directed,
         )
-    if not found and failed is not None:
+    if not axes and failed is not None:
         raise failed
-    return found, notices
+    return axes, notices
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,13 +155,13 @@ def _find_axis(
     if segment in TRUNK:
         upwards = rotate(x.q, signals.acc)[:, 2]
         steps_s = [step_time(upwards[p[0] : p[1]], rate) for p in parts]
-    seen = acceleration_axis(a, parts, bearing, rate, params, steps_s)
+    acceleration = acceleration_axis(a, parts, bearing, rate, params, steps_s)
     strides = stride_direction(a, x.sensor.flats, parts, bearing, rate, params)
-    best = seen if strides is None else strides
+    best = acceleration if strides is None else strides
     if steps_s is not None:
         vaulting = pendulum_agreement(a, upwards, best.angle, parts, bearing, rate, steps_s)
     push = _push(a, best.angle, parts, bearing, rate)
-    return _WalkedAxis(best.angle, best.score, strides is not None, seen, vaulting, push)
+    return _WalkedAxis(best.angle, best.score, strides is not None, acceleration, vaulting, push)
 
 
 def _list_measures(
@@ -184,11 +184,11 @@ def _list_measures(
     return heard, mirror
 
 
-def _in_order(worn: Mapping[Segment, object]) -> Iterator[Segment]:
+def _in_order(sensors: Mapping[Segment, object]) -> Iterator[Segment]:
     """Sensors in the order in which their sign can be determined: shanks first, then feet, thighs, trunk."""
     for group in (SHANK, FOOT, THIGH):
-        yield from (group[side] for side in SIDES if group[side] in worn)
-    yield from (s for s in TRUNK if s in worn)
+        yield from (group[side] for side in SIDES if group[side] in sensors)
+    yield from (s for s in TRUNK if s in sensors)
 
 
 def _sign(
@@ -225,11 +225,11 @@ def _sign(
             ),
             sensor=segment,
         )
-    for other, theirs in pushed.items():
-        if other[-1] == segment[-1] and np.ptp(forward) > 0.0 and np.ptp(theirs) > 0.0:
+    for neighbour, theirs in pushed.items():
+        if neighbour[-1] == segment[-1] and np.ptp(forward) > 0.0 and np.ptp(theirs) > 0.0:
             together = float(np.corrcoef(forward, theirs)[0, 1])
             if abs(together) >= TOGETHER:
-                return (axis if together > 0 else nearest_sign(axis, axis + np.pi)), other, ()
+                return (axis if together > 0 else nearest_sign(axis, axis + np.pi)), neighbour, ()
     if segment in SHANK.values():
         signals = recording.sensors[segment]
         rate = (signals.gyr - x.sensor.gyro_bias)[mask] @ (about_vertical(-axis) @ R)[2]

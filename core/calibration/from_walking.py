@@ -63,7 +63,7 @@ def calibrate_from_walking(
     attitude: AttitudeParams,
     params: WalkRungParams,
     method: Method,
-    why: SignalError,
+    reason: SignalError,
     rests: tuple[Window, ...],
     forward: ForwardParams,
     joint_turns: JointTurnParams,
@@ -72,7 +72,7 @@ def calibrate_from_walking(
 
     Parameters
     ----------
-    why : the reason for rejecting standing; raised if walking cannot replace it. rests : pauses in
+    reason : the reason for rejecting standing; raised if walking cannot replace it. rests : pauses in
     mid-stride.
 
     Returns
@@ -82,42 +82,42 @@ def calibrate_from_walking(
 
     Raises
     ------
-    SignalError `why` if there is no sufficiently long walk either. CalibrationError of the first sensor if
+    SignalError `reason` if there is no sufficiently long walk either. CalibrationError of the first sensor if
     none can be calibrated.
     """
     rate = recording.rate_hz
-    sensors, moving, turning = _follow_sensors(recording, walking, attitude, params, why)
+    sensors, moving, turning = _follow_sensors(recording, walking, attitude, params, reason)
     parts = straight_parts(moving, turning, rate, walking)
     if not parts:
-        raise why
+        raise reason
     home = max(parts, key=lambda p: p[1] - p[0])
     reach = heading.reach_s * rate
     near = [p for p in parts if abs(0.5 * (p[0] + p[1] - home[0] - home[1])) <= reach]
     bearing = _bearings(recording, sensors, near, home)
     neutral = {s: _find_neutral(s, x, near, home) for s, x in sensors.items()}
-    found, notices = find_forward_in_walk(recording, neutral, near, bearing, heading, method, forward)
+    axes, notices = find_forward_in_walk(recording, neutral, near, bearing, heading, method, forward)
     joints = measure_joint_turns(
         recording,
-        {s: neutral[s].sensor.gyro_bias for s in found},
-        {s: neutral[s].q for s in found},
+        {s: neutral[s].sensor.gyro_bias for s in axes},
+        {s: neutral[s].q for s in axes},
         near,
         joint_turns,
     )
-    found = weigh_axes(found, joints, forward)
-    notices += [n for f in found.values() for n in f.notices]
+    axes = weigh_axes(axes, joints, forward)
+    notices += [n for f in axes.values() for n in f.notices]
     notices.append(Notice("from_walking", FROM_PAUSES if rests else FROM_WALKING))
     zero = (home[0] / rate, home[1] / rate)
-    at = round(0.5 * (zero[0] + zero[1]) * rate)
+    middle = round(0.5 * (zero[0] + zero[1]) * rate)
     calibration = Calibration(
-        segments={s: _mounted(neutral[s], f, at) for s, f in found.items()},
+        segments={s: _mounted(neutral[s], f, middle) for s, f in axes.items()},
         rest=rests,
         walking=tuple((a / rate, b / rate) for a, b in parts),
         zero=zero,
         turning=turning,
         method=method,
         notices=tuple(notices),
-        diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in found.items()},
-        straight_steps=_straight_steps(found, neutral, near),
+        diagnostics={s: {"method": f.method, "score": f.score, **f.facts} for s, f in axes.items()},
+        straight_steps=_straight_steps(axes, neutral, near),
         posture="walking",
     )
     return CalibratedRecording(recording, calibration)
@@ -128,14 +128,14 @@ def _follow_sensors(
     walking: WalkingParams,
     attitude: AttitudeParams,
     params: WalkRungParams,
-    why: SignalError,
+    reason: SignalError,
 ) -> tuple[dict[Segment, SensorInWalk], Bools, Bools]:
     """Track every sensor through the walks; also the samples (n,) of movement and of turns."""
     rate = recording.rate_hz
     moving = moving_mask(recording, walking)
     walks = [r for r in find_runs(moving) if r[1] - r[0] >= params.least_s * rate]
     if not walks:
-        raise why
+        raise reason
     straight, turning = moving, moving
     sensors: dict[Segment, SensorInWalk] = {}
     # where the person turns is known once a sensor's vertical is
@@ -146,7 +146,7 @@ def _follow_sensors(
             if (x := follow_sensor(s, recording.sensors[s], walks, straight, rate, attitude, params))
         }
         if not all(s in sensors for s in turn_sensors(recording)):
-            raise why
+            raise reason
         bias, q = {s: x.gyro_bias for s, x in sensors.items()}, {s: x.q for s, x in sensors.items()}
         turning = turning_mask(recording, bias, q, walking) & moving
         straight = moving & ~turning
@@ -172,31 +172,31 @@ def _bearings(
 def _find_neutral(segment: Segment, sensor: SensorInWalk, parts: list[Part], home: Part) -> NeutralSensor:
     """Posture of a flat foot, or mean posture of straight walking."""
     q, n = sensor.q, len(sensor.q)
-    seen, here = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+    walking_mask, reference_mask = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
     for a, b in parts:
-        seen[a:b] = True
-    here[home[0] : home[1]] = True
+        walking_mask[a:b] = True
+    reference_mask[home[0] : home[1]] = True
     if segment in FOOT.values() and len(sensor.flats) >= 3:
         flat = np.zeros(n, np.bool_)
         flat[sensor.flats] = True
         up = np.median(find_vertical(q[flat]), axis=0)
-        here = here & flat if (here & flat).any() else here
+        reference_mask = reference_mask & flat if (reference_mask & flat).any() else reference_mask
     else:
-        up = find_vertical(q[seen]).mean(axis=0)
+        up = find_vertical(q[walking_mask]).mean(axis=0)
     up = up / np.linalg.norm(up)
     facing = from_matrix(R_NEUTRAL @ vertical_frame(up))
-    turned = float(np.angle(np.exp(1j * measure_turned_angle(q[here], facing)).mean()))
+    turned = float(np.angle(np.exp(1j * measure_turned_angle(q[reference_mask], facing)).mean()))
     return NeutralSensor(up, multiply(about(2, -turned), q), sensor)
 
 
-def _mounted(x: NeutralSensor, found: AnteriorAxis, at: int) -> SegmentCalibration:
+def _mounted(x: NeutralSensor, found: AnteriorAxis, sample: int) -> SegmentCalibration:
     return SegmentCalibration(
         R_segment_sensor=about_vertical(-found.angle) @ vertical_frame(x.up),
         gyro_bias=x.sensor.gyro_bias,
         rest_norm=x.sensor.norm,
         method=found.method,
         score=min(1.0, max(0.0, found.score)),
-        start_q=multiply(about(2, -found.angle), x.q[at]),
+        start_q=multiply(about(2, -found.angle), x.q[sample]),
         forward_sd=found.sd,
     )
 

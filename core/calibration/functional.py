@@ -104,24 +104,24 @@ def find_functional_movements(recording: UniformRecording, params: FunctionalPar
     The other leg must carry a sensor, and for bows both shanks or feet: with a single sensor a swing cannot
     be distinguished from a step.
     """
-    worn, rate = recording.sensors, recording.rate_hz
-    legs = {side: [s for s in (THIGH[side], SHANK[side], FOOT[side]) if s in worn] for side in SIDES}
+    signals, rate = recording.sensors, recording.rate_hz
+    legs = {side: [s for s in (THIGH[side], SHANK[side], FOOT[side]) if s in signals] for side in SIDES}
     none = np.zeros(len(recording.t_s), np.bool_)
     if not all(legs.values()):
         return FunctionalMovements(dict.fromkeys(SIDES, none), none)
     pace = {side: _average(recording, legs[side], params.swing_s) for side in SIDES}
     swings: dict[Side, Bools] = {}
-    for side, other in ((SIDES[0], SIDES[1]), (SIDES[1], SIDES[0])):
-        mine, theirs = pace[side], pace[other]
-        alone = (theirs < params.still_rate) & (theirs < params.still_share * mine)
-        swings[side] = _join(alone & (mine > params.swing_rate), rate, params)
-    trunk = [s for s in TRUNK if s in worn]
+    for side, opposite in ((SIDES[0], SIDES[1]), (SIDES[1], SIDES[0])):
+        mine, theirs = pace[side], pace[opposite]
+        single = (theirs < params.still_rate) & (theirs < params.still_share * mine)
+        swings[side] = _join(single & (mine > params.swing_rate), rate, params)
+    trunk = [s for s in TRUNK if s in signals]
     low = {side: [s for s in legs[side] if s != THIGH[side]] for side in SIDES}
     if not trunk or not all(low.values()):
         return FunctionalMovements(swings, none)
     bowing = _average(recording, trunk, params.bow_s)
     feet = np.maximum(*(_average(recording, low[side], params.bow_s) for side in SIDES))
-    thighs = [s for s in THIGH.values() if s in worn]
+    thighs = [s for s in THIGH.values() if s in signals]
     upright = _average(recording, thighs, params.bow_s) if thighs else np.zeros(len(none))
     bows = (bowing > params.bow_rate) & (np.maximum(feet, upright) < params.still_share * bowing)
     return FunctionalMovements(swings, _join(bows & (feet < params.still_rate), rate, params))
@@ -141,35 +141,39 @@ def find_functional_axes(
     ----------
     q : segment → (n, 4) sensor to its rest frame.
     """
-    found: dict[Segment, AnteriorAxis] = {}
+    axes: dict[Segment, AnteriorAxis] = {}
     for segment, signals in recording.sensors.items():
-        how, seen = movements.shown_by(segment)
-        seen = seen & signals.valid
-        if not seen.any():
+        movement, mask = movements.shown_by(segment)
+        mask = mask & signals.valid
+        if not mask.any():
             continue
         R_vertical = vertical_frame(standing[segment].up)
         try:
-            axis = flexion_axis(signals.gyr[seen] - standing[segment].gyro_bias, R_vertical, segment)
+            axis = flexion_axis(signals.gyr[mask] - standing[segment].gyro_bias, R_vertical, segment)
         except CalibrationError:
             continue  # turned about several axes: the walk has to show it
         up = find_vertical(q[segment])
-        angle, margin = _give_sign(-axis.gamma, how, up[seen], R_vertical)
+        angle, margin = _give_sign(-axis.gamma, movement, up[mask], R_vertical)
         written = read_declared_angle(recording.mounting.get(segment, ""), R_vertical, segment)
         if written is not None:
             angle, margin = nearest_sign(angle, written), np.inf
-        bend = sagittal_angle(up, about_vertical(-angle) @ R_vertical) * FORWARD[how]
-        asked = params.swings if how == "hip_swing" else params.bows
-        done = sum(count_repetitions(bend[a:b]) for a, b in find_runs(_widen(seen, recording.rate_hz)))
-        if 2 * done < asked:
+        bend = sagittal_angle(up, about_vertical(-angle) @ R_vertical) * FORWARD[movement]
+        requested = params.swings if movement == "hip_swing" else params.bows
+        done = sum(count_repetitions(bend[a:b]) for a, b in find_runs(_widen(mask, recording.rate_hz)))
+        if 2 * done < requested:
             continue
-        told = tuple(_tell(segment, how, done, asked, axis.rho, margin))
-        facts = {"source": how, "rho": axis.rho, "repetitions": done, "asked": asked}
-        said = ForwardMeasure(how, angle, forward.movement_sd, forward.movement_doubt)
-        found[segment] = AnteriorAxis(angle, how, axis.rho, told, facts, measures=(said,), kept=True)
-    return found
+        notices = tuple(_tell(segment, movement, done, requested, axis.rho, margin))
+        facts = {"source": movement, "rho": axis.rho, "repetitions": done, "asked": requested}
+        measure = ForwardMeasure(movement, angle, forward.movement_sd, forward.movement_doubt)
+        axes[segment] = AnteriorAxis(
+            angle, movement, axis.rho, notices, facts, measures=(measure,), kept=True
+        )
+    return axes
 
 
-def _give_sign(axis: float, how: FunctionalMethod, up: Floats, R_vertical: Floats) -> tuple[float, float]:
+def _give_sign(
+    axis: float, movement: FunctionalMethod, up: Floats, R_vertical: Floats
+) -> tuple[float, float]:
     """Forward end of an axis, and how clear that is, rad: legs swing forward, trunks bow forward.
 
     Parameters
@@ -177,54 +181,54 @@ def _give_sign(axis: float, how: FunctionalMethod, up: Floats, R_vertical: Float
     up : (m, 3) the vertical in sensor axes during the movement.
     """
     bend = float(sagittal_angle(up, about_vertical(-axis) @ R_vertical).mean())
-    forward = bend * FORWARD[how]
+    forward = bend * FORWARD[movement]
     return (axis if forward >= 0.0 else nearest_sign(axis, axis + np.pi)), abs(forward)
 
 
 def _tell(
-    segment: Segment, how: FunctionalMethod, done: int, asked: int, rho: float, margin: float
+    segment: Segment, movement: FunctionalMethod, done: int, requested: int, rho: float, margin: float
 ) -> Sequence[Notice]:
-    what, further = ("swings", "swing") if how == "hip_swing" else ("bows", "bow")
-    told = []
-    if done < asked:
+    movement_words, further = ("swings", "swing") if movement == "hip_swing" else ("bows", "bow")
+    notices = []
+    if done < requested:
         message = (
             Message(
                 f"{{segment}}: calibration used {{done}} {plural(done, 'swing', 'swings')}; {{asked}} or "
                 "more are recommended.",
                 segment=segment,
                 done=done,
-                asked=asked,
+                asked=requested,
             )
-            if how == "hip_swing"
+            if movement == "hip_swing"
             else Message(
                 f"{{segment}}: calibration used {{done}} {plural(done, 'bow', 'bows')}; {{asked}} or more "
                 "are recommended.",
                 segment=segment,
                 done=done,
-                asked=asked,
+                asked=requested,
             )
         )
-        told.append(Notice("few_repetitions", message, sensor=segment))
+        notices.append(Notice("few_repetitions", message, sensor=segment))
     if rho < GOOD_AXIS:
         message = Message(
             "{segment}: in the {what} the first principal component explains {rho:.0%} of the movement "
             "(good: {GOOD_AXIS:.0%} or more). Move in one plane.",
             segment=segment,
-            what=what,
+            what=movement_words,
             rho=rho,
             GOOD_AXIS=GOOD_AXIS,
         )
-        told.append(Notice("not_single_axis", message, sensor=segment))
+        notices.append(Notice("not_single_axis", message, sensor=segment))
     if margin < WEAK_MARGIN:
         message = Message(
             "{segment}: forward and backward are hard to distinguish in these {what}; {further} further "
             "forward than back, or declare the placement.",
             segment=segment,
-            what=what,
+            what=movement_words,
             further=further,
         )
-        told.append(Notice("calibration_sign_weak", message, sensor=segment))
-    return told
+        notices.append(Notice("calibration_sign_weak", message, sensor=segment))
+    return notices
 
 
 def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: float) -> Floats:
@@ -236,19 +240,19 @@ def _average(recording: UniformRecording, segments: Sequence[Segment], seconds: 
     return np.asarray(uniform_filter1d(rate, width, mode="nearest"))
 
 
-def _widen(seen: Bools, rate_hz: float) -> Bools:
+def _widen(mask: Bools, rate_hz: float) -> Bools:
     """The movement (n,) including its edges, where it begins and ends slowly."""
-    wide, edge = seen.copy(), round(EDGE_S * rate_hz)
-    for a, b in find_runs(seen):
+    wide, edge = mask.copy(), round(EDGE_S * rate_hz)
+    for a, b in find_runs(mask):
         wide[max(0, a - edge) : b + edge] = True
     return wide
 
 
-def _join(seen: Bools, rate_hz: float, params: FunctionalParams) -> Bools:
+def _join(mask: Bools, rate_hz: float, params: FunctionalParams) -> Bools:
     """Runs (n,) with breaks of up to `pause_s` closed; only those of at least `shortest_s`."""
-    joined = seen.copy()
-    for a, b in find_runs(~seen):
-        if a > 0 and b < len(seen) and b - a <= params.pause_s * rate_hz:
+    joined = mask.copy()
+    for a, b in find_runs(~mask):
+        if a > 0 and b < len(mask) and b - a <= params.pause_s * rate_hz:
             joined[a:b] = True
     for a, b in find_runs(joined):
         if b - a < params.shortest_s * rate_hz:

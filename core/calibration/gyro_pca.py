@@ -70,8 +70,8 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
     ------
     CalibrationError `not_single_axis` if the movement has no dominant axis (ρ < 0.70).
     """
-    found = measure_flexion(rate, R_vertical)
-    rho = found.rho
+    axis = measure_flexion(rate, R_vertical)
+    rho = axis.rho
     if rho < SINGLE_AXIS:
         raise CalibrationError(
             "not_single_axis",
@@ -85,13 +85,13 @@ def flexion_axis(rate: Floats, R_vertical: Floats, segment: Segment) -> FlexionA
             ),
             sensor=segment,
         )
-    return found
+    return axis
 
 
 def measure_flexion(rate: Floats, R_vertical: Floats) -> FlexionAxis:
     """Like `flexion_axis`, for rates (n, 3) in sensor coordinates, without a check for a dominant axis."""
-    found = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
-    return FlexionAxis(float(np.arctan2(-found.x, found.z)), found.share)
+    axis = measure_main_axis((rate @ R_vertical.T)[:, [0, 2]])
+    return FlexionAxis(float(np.arctan2(-axis.x, axis.z)), axis.share)
 
 
 def about_vertical(gamma: float) -> Floats:

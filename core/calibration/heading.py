@@ -153,7 +153,7 @@ def stride_direction(
 
 def start_direction(
     a: Complexes,
-    rest: Window,
+    still_window: Window,
     part: Part,
     turn: float,
     leads: bool,
@@ -172,7 +172,7 @@ def start_direction(
     -------
     None if rest and part are further apart than that, or the speed is implausible.
     """
-    edge = round(rest[1] * rate_hz) if leads else round(rest[0] * rate_hz)
+    edge = round(still_window[1] * rate_hz) if leads else round(still_window[0] * rate_hz)
     gap = (part[0] - edge) if leads else (edge - part[1])
     if gap > longest_gap_s * rate_hz:
         return None
@@ -260,7 +260,7 @@ def pendulum_agreement(
     a, up : (n,) horizontal acceleration in the sensor's world and vertical specific force, m/s².
     steps_s : step time in each part, 0 = undetermined.
     """
-    both, own, rise = 0.0, 0.0, 0.0
+    covariance, own, rise = 0.0, 0.0, 0.0
     for (start, end), turn, step_s in zip(parts, bearing, steps_s, strict=True):
         shift = round(step_s * rate_hz)
         if not 0 < shift < (end - start) // 2:
@@ -270,8 +270,8 @@ def pendulum_agreement(
         y = np.gradient(y)
         x, y = x[:-shift] + x[shift:], y[:-shift] + y[shift:]
         x, y = x - x.mean(), y - y.mean()
-        both, own, rise = both + float(x @ y), own + float(x @ x), rise + float(y @ y)
-    return both / float(np.sqrt(own * rise)) if own * rise > 0.0 else 0.0
+        covariance, own, rise = covariance + float(x @ y), own + float(x @ x), rise + float(y @ y)
+    return covariance / float(np.sqrt(own * rise)) if own * rise > 0.0 else 0.0
 
 
 def _around_steps(x: Floats, rate_hz: float) -> Floats:

@@ -60,8 +60,8 @@ def measure_joint_turns(
     ----------
     biases : segment → (3,) rad/s. q : segment → (n, 4) sensor to its rest frame.
     """
-    worn = list_worn_joints(q)
-    if not worn or not parts:
+    instrumented = list_worn_joints(q)
+    if not instrumented or not parts:
         return []
     rate, thin = recording.rate_hz, find_thinning(recording.rate_hz, params.joints)
     start, stop = min(a for a, _ in parts), max(b for _, b in parts)
@@ -70,18 +70,18 @@ def measure_joint_turns(
         walked[a:b] = True
     terms: dict[Segment, Floats] = {}
     usable: dict[Segment, Bools] = {}
-    for segment in {s for joint in worn for s in joint}:
+    for segment in {s for joint in instrumented for s in joint}:
         x = recording.sensors[segment]
         gyr = x.gyr[start:stop] - biases[segment]
         slow, _ = low_pass_terms(
             q[segment][None, start:stop], x.acc[None, start:stop], gyr[None], rate, params.joints
         )
         terms[segment] = take_mean_out(slow, rate / thin, params.joints)[0]
-        seen = find_usable(x.valid[start:stop, None], rate)[0] & walked[start:stop]
-        usable[segment] = seen[::thin]
+        usable_mask = find_usable(x.valid[start:stop, None], rate)[0] & walked[start:stop]
+        usable[segment] = usable_mask[::thin]
     chunk = round(params.joints.chunk_s * rate / thin)
-    found = (_measure(joint, terms, usable, chunk, params) for joint in worn)
-    return [x for x in found if x is not None]
+    measures = (_measure(joint, terms, usable, chunk, params) for joint in instrumented)
+    return [x for x in measures if x is not None]
 
 
 def _measure(
@@ -100,10 +100,10 @@ def _measure(
     sums = JointSums.empty(chunks, 0)
     sums.add(slice(None), terms[first][:n], terms[second][:n], usable[first][:n], usable[second][:n], chunk)
     whole = replace(params.joints, window_chunks=chunks, least_chunks=LEAST_CHUNKS)
-    found = sums.solve(np.zeros(1, np.int64), chunk, whole)
-    if not len(found) or found[0, 3] > params.worst_misfit:
+    solved = sums.solve(np.zeros(1, np.int64), chunk, whole)
+    if not len(solved) or solved[0, 3] > params.worst_misfit:
         return None
-    turn = float(found[0, 10])
+    turn = float(solved[0, 10])
     width = params.joints.window_chunks
     starts = np.arange(0, max(0, chunks - width + 1), max(1, width // 2))
     # a heading that drifts while somebody walks had drifted before, since the standing, by as much

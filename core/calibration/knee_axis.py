@@ -68,20 +68,20 @@ def measure_knees(calibrated: CalibratedRecording) -> dict[Side, KneeAxes]:
     straight = np.zeros(len(recording.t_s), np.bool_)
     for window in calibrated.calibration.walking:
         straight[index_window(window, recording.rate_hz)] = True
-    found: dict[Side, KneeAxes] = {}
+    axes: dict[Side, KneeAxes] = {}
     for side in SIDES:
         pair = (THIGH[side], SHANK[side])
         if not set(pair) <= set(mounted):
             continue
-        seen = np.logical_and.reduce([straight, *(recording.sensors[s].valid for s in pair)])
-        if np.count_nonzero(seen) < KNEE_SEEN * recording.rate_hz:
+        mask = np.logical_and.reduce([straight, *(recording.sensors[s].valid for s in pair)])
+        if np.count_nonzero(mask) < KNEE_SEEN * recording.rate_hz:
             continue
         thigh, shank = (
-            (recording.sensors[s].gyr[seen] - mounted[s].gyro_bias) @ mounted[s].R_segment_sensor.T
+            (recording.sensors[s].gyr[mask] - mounted[s].gyro_bias) @ mounted[s].R_segment_sensor.T
             for s in pair
         )
-        found[side] = find_knee_axes(thigh, shank)
-    return found
+        axes[side] = find_knee_axes(thigh, shank)
+    return axes
 
 
 def find_knee_axes(thigh: Floats, shank: Floats) -> KneeAxes:
@@ -116,7 +116,7 @@ def _measure_across(rate: Floats, turn: Floats) -> tuple[Floats, Floats]:
     (ca, sa), (ce, se) = ((np.cos(v), np.sin(v)) for v in turn)
     j = np.array([ce * sa, se, ce * ca])
     dj = np.array([[ce * ca, -se * sa], [0.0, ce], [-ce * sa, -se * ca]])
-    across = np.cross(rate, j)
-    size = np.linalg.norm(across, axis=1)
-    slope = np.cross(across, rate) / np.maximum(size, 1e-9)[:, None]
+    perpendicular = np.cross(rate, j)
+    size = np.linalg.norm(perpendicular, axis=1)
+    slope = np.cross(perpendicular, rate) / np.maximum(size, 1e-9)[:, None]
     return size, slope @ dj

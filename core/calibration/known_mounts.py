@@ -68,8 +68,8 @@ def calibrate_with_mounts(
     `mounting_not_as_agreed`. SignalError `no_rest`, `rest_too_short`, `not_still`, `unit_suspect`.
     """
     params = params or RestParams()
-    worn = [s for s in mounts if s in recording.sensors]
-    if not worn:
+    mounted_segments = [s for s in mounts if s in recording.sensors]
+    if not mounted_segments:
         raise CalibrationError(
             "no_segment",
             Message(
@@ -78,12 +78,12 @@ def calibrate_with_mounts(
                 sensors=", ".join(recording.sensors),
             ),
         )
-    found = find_rests(recording, params)
-    rests = tuple((max(r[0], after_s), r[1]) for r in found if r[1] - params.shortest_s >= after_s)
+    candidates = find_rests(recording, params)
+    rests = tuple((max(r[0], after_s), r[1]) for r in candidates if r[1] - params.shortest_s >= after_s)
     if not rests:
         raise SignalError("no_rest", "No quiet standing detected with the sensors attached.", t_s=after_s)
-    rest = next((r for r in rests if r[1] - r[0] >= GOOD_S), None) or max(rests, key=lambda r: r[1] - r[0])
-    zero = (max(rest[0], rest[1] - LONGEST_S), rest[1])
+    chosen = next((r for r in rests if r[1] - r[0] >= GOOD_S), None) or max(rests, key=lambda r: r[1] - r[0])
+    zero = (max(chosen[0], chosen[1] - LONGEST_S), chosen[1])
     standing = stand_all(recording, zero, rests, params)
     calibration = Calibration(
         segments={
@@ -94,7 +94,7 @@ def calibrate_with_mounts(
                 method=method,
                 score=score,
             )
-            for s in worn
+            for s in mounted_segments
         },
         rest=rests,
         walking=(),
@@ -126,9 +126,9 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
         if segment not in FORWARD:
             continue
         side = SIDE_OF[segment]
-        after = signals.valid & stands[side] if side in stands else signals.valid.copy()
-        after[: standing.stop] = False
-        rate, force = ((x[after] @ R.T) for x in (signals.gyr - mounted.gyro_bias, signals.acc))
+        movement = signals.valid & stands[side] if side in stands else signals.valid.copy()
+        movement[: standing.stop] = False
+        rate, force = ((x[movement] @ R.T) for x in (signals.gyr - mounted.gyro_bias, signals.acc))
         if len(rate) < 3 or float(np.sqrt(np.mean((rate**2).sum(axis=1)))) < BENDING:
             continue
         axis = np.linalg.eigh(rate.T @ rate)[1][:, -1]
@@ -146,14 +146,14 @@ def _check_mounts(calibrated: CalibratedRecording) -> None:
             )
 
 
-def _refuse(segment: Segment, what: str) -> CalibrationError:
+def _refuse(segment: Segment, problem: str) -> CalibrationError:
     return CalibrationError(
         "mounting_not_as_agreed",
         Message(
             "{segment}: {what}; limit {OFF:.0f}°. Attach the sensor as specified in the protocol, or "
             "calibrate from the table.",
             segment=segment,
-            what=what,
+            what=problem,
             OFF=degrees(OFF),
         ),
         sensor=segment,

@@ -20,13 +20,13 @@ class StandingNow:
     longest_s: float
 
 
-def judge_standing(recording: UniformRecording, rest: RestParams) -> StandingNow:
+def judge_standing(recording: UniformRecording, params: RestParams) -> StandingNow:
     """Judge by the rules of core/signals/rest.py; the last second determines the current state."""
     rate, n = recording.rate_hz, len(recording.t_s)
-    quiet = {s: measure_quietness(x, rate, rest).quiet for s, x in recording.sensors.items()}
+    quiet = {s: measure_quietness(x, rate, params).quiet for s, x in recording.sensors.items()}
     if not quiet or not n:
         return StandingNow(frozenset(), 0.0, 0.0)
-    windows = find_windows(np.logical_and.reduce(list(quiet.values())), rate, rest)
+    windows = find_windows(np.logical_and.reduce(list(quiet.values())), rate, params)
     lasting = [b - a for a, b in windows if round(b * rate) >= n]
     return StandingNow(
         frozenset(s for s, x in quiet.items() if x[-1]),

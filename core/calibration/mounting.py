@@ -36,11 +36,11 @@ def read_declared_direction(text: str) -> tuple[Floats, float] | None:
     >>> declared_direction("sacrum, face backwards")[1]
     3.141592653589793
     """
-    found = _PHRASE.search(text)
-    if found is None:
+    phrase = _PHRASE.search(text)
+    if phrase is None:
         return None
-    axis = AXES[(found["axis"] or "z").lower()] * (-1.0 if found["sign"] == "-" else 1.0)
-    return axis, float(np.radians(WAYS[found["way"].lower()]))
+    axis = AXES[(phrase["axis"] or "z").lower()] * (-1.0 if phrase["sign"] == "-" else 1.0)
+    return axis, float(np.radians(WAYS[phrase["way"].lower()]))
 
 
 def say_other_way(text: str, way: Way) -> str:
@@ -49,8 +49,8 @@ def say_other_way(text: str, way: Way) -> str:
     >>> say_other_way("sacrum, face backwards", "forward")
     'sacrum, face forward'
     """
-    found = _PHRASE.search(text)
-    return text if found is None else text[: found.start("way")] + way + text[found.end() :]
+    phrase = _PHRASE.search(text)
+    return text if phrase is None else text[: phrase.start("way")] + way + text[phrase.end() :]
 
 
 def read_declared_angle(text: str, R_vertical: Floats, segment: Segment) -> float | None:

@@ -124,10 +124,10 @@ class CalibrationScore:
 
     def to_json(self) -> dict[str, object]:
         """Verdicts of the recording and its sensors, and every check, as JSON values."""
-        worn = [s for s in SEGMENTS if any(c.segment == s for c in self.checks)]
+        segments = [s for s in SEGMENTS if any(c.segment == s for c in self.checks)]
         return {
             "verdict": self.verdict,
-            "segments": {s: self.judge_segment(s) for s in worn},
+            "segments": {s: self.judge_segment(s) for s in segments},
             "checks": [c.to_json() for c in self.checks],
         }
 
@@ -136,8 +136,8 @@ def judge_together(checks: Iterable[CalibrationCheck]) -> CalibrationVerdict:
     """Combined verdict: "redo" if any check requires it, "pass" if any check passed and none requires a
     redo.
     """
-    found = {c.verdict for c in checks}
-    return "redo" if "redo" in found else "pass" if "pass" in found else "not_judged"
+    verdicts = {c.verdict for c in checks}
+    return "redo" if "redo" in verdicts else "pass" if "pass" in verdicts else "not_judged"
 
 
 def score_calibration(
@@ -206,12 +206,12 @@ class _Evidence:
 
     def _find_axis(self, segment: Segment) -> tuple[float, float] | None:
         """Deviation of the rotation axis from the medio-lateral axis, rad, and the share of that axis."""
-        seen = self._seen(segment)
-        if segment in TRUNK or np.count_nonzero(seen) < TURNED_ALL * self.recording.rate_hz:
+        mask = self._seen(segment)
+        if segment in TRUNK or np.count_nonzero(mask) < TURNED_ALL * self.recording.rate_hz:
             return None
-        found = measure_main_axis(self.rates[segment][seen][:, [0, 2]])
-        heading = float(np.arctan2(found.x, found.z))
-        return 0.5 * float(wrap_angle(2.0 * heading)), found.share
+        axis = measure_main_axis(self.rates[segment][mask][:, [0, 2]])
+        heading = float(np.arctan2(axis.x, axis.z))
+        return 0.5 * float(wrap_angle(2.0 * heading)), axis.share
 
     def _judge(self, name: CheckName, segment: Segment | None, value: float) -> CalibrationCheck:
         rule, limit = RULE_OF[name], float(getattr(self.params, name))
@@ -221,23 +221,23 @@ class _Evidence:
         )
 
     def _leave(
-        self, name: CheckName, segment: Segment | None, why: str, value: float | None = None
+        self, name: CheckName, segment: Segment | None, reason: str, value: float | None = None
     ) -> CalibrationCheck:
         limit = float(getattr(self.params, name))
-        return CalibrationCheck(name, segment, value, limit, "not_judged", why)
+        return CalibrationCheck(name, segment, value, limit, "not_judged", reason)
 
     def tell_missing(self, segment: Segment) -> CalibrationCheck:
-        said = [n.message for n in self.calibration.notices if n.sensor == segment]
-        why = said[0] if said else RULE_OF["forward_found"].means
-        return CalibrationCheck("forward_found", segment, None, None, "redo", why)
+        messages = [n.message for n in self.calibration.notices if n.sensor == segment]
+        reason = messages[0] if messages else RULE_OF["forward_found"].means
+        return CalibrationCheck("forward_found", segment, None, None, "redo", reason)
 
     def check_repetitions(self, segment: Segment) -> CalibrationCheck:
         """Number of swings or bows available for this sensor."""
         facts = self._facts(segment)
-        done, asked = float(facts["repetitions"]), float(facts["asked"])
-        why = "" if done >= asked else RULE_OF["repetitions"].means
-        verdict: CalibrationVerdict = "redo" if why else "pass"
-        return CalibrationCheck("repetitions", segment, done, asked, verdict, why)
+        done, requested = float(facts["repetitions"]), float(facts["asked"])
+        reason = "" if done >= requested else RULE_OF["repetitions"].means
+        verdict: CalibrationVerdict = "redo" if reason else "pass"
+        return CalibrationCheck("repetitions", segment, done, requested, verdict, reason)
 
     def _facts(self, segment: Segment) -> Mapping[str, Any]:
         """Diagnostics on how the forward axis was determined."""
@@ -268,21 +268,21 @@ class _Evidence:
             return self._judge("axis_share", segment, float(self._facts(segment)["rho"]))
         if segment in TRUNK:
             return self._leave("axis_share", segment, "The trunk rotates about all axes in walking.")
-        found = self.axes[segment]
-        if found is None:
+        axis = self.axes[segment]
+        if axis is None:
             return self._leave("axis_share", segment, "No straight walking available.")
-        return self._judge("axis_share", segment, found[1])
+        return self._judge("axis_share", segment, axis[1])
 
     def check_mirror(self, segment: Segment) -> CalibrationCheck:
         pair = next((p for p in (THIGH, SHANK, FOOT) if segment in p.values()), None)
         if pair is None:
             return self._leave("mirror", segment, "No sensor on the other side to compare with.")
-        found = [self.axes.get(s) for s in pair.values()]
-        known = [x for x in found if x is not None]
-        if len(known) < len(found):
+        side_axes = [self.axes.get(s) for s in pair.values()]
+        available = [x for x in side_axes if x is not None]
+        if len(available) < len(side_axes):
             return self._leave("mirror", segment, "No calibrated sensor with walking data on the other side.")
-        apart = degrees(abs(float(wrap_angle(known[0][0] + known[1][0]))))
-        if min(share for _, share in known) < GOOD_AXIS:
+        apart = degrees(abs(float(wrap_angle(available[0][0] + available[1][0]))))
+        if min(share for _, share in available) < GOOD_AXIS:
             return self._leave("mirror", segment, "Its main axis of rotation is not clear enough.", apart)
         return self._judge("mirror", segment, apart)
 
@@ -290,8 +290,8 @@ class _Evidence:
         side = next((s for s in SIDES if segment in (THIGH[s], SHANK[s])), None)
         if side is None:
             return self._leave("knee_axis", segment, "Not adjacent to a knee.")
-        found = self.knees.get(side)
-        if found is None:
+        axes = self.knees.get(side)
+        if axes is None:
             return self._leave(
                 "knee_axis",
                 segment,
@@ -300,8 +300,8 @@ class _Evidence:
                     KNEE_SEEN=KNEE_SEEN,
                 ),
             )
-        apart = degrees(abs(float(wrap_angle(found.apart))))
-        if found.steepest > STEEPEST:
+        apart = degrees(abs(float(wrap_angle(axes.apart))))
+        if axes.steepest > STEEPEST:
             return self._leave(
                 "knee_axis", segment, "Soft-tissue motion is too large to determine the knee axis.", apart
             )
@@ -321,16 +321,16 @@ class _Evidence:
         """Largest deviation of the axis in use from the accepted measures of forward and from the initial
         calibration.
         """
-        said = self._facts(segment)
+        facts = self._facts(segment)
         back = float(self.turned.get(segment, 0.0))
         measures = [back] if segment in self.turned else []
-        off = said.get("disagreement_rad")
-        if said.get("source") == "strides" and isinstance(off, float | int):
+        off = facts.get("disagreement_rad")
+        if facts.get("source") == "strides" and isinstance(off, float | int):
             # a foot keeps the way of its strides, whatever speaks against it
             measures += [back, float(wrap_angle(float(off) + back))]
         measures += [
             float(wrap_angle(v["off_rad"] + back))
-            for v in said.get("votes", ())
+            for v in facts.get("votes", ())
             if v["source"] in OF_FORWARD and v["share"] >= HEARD
         ]
         if not measures:

@@ -135,12 +135,12 @@ def follow_sensor(
         bias = bias + _bias_step(stretches, signals, bias, straight, flats, rate_hz, params)
     stretches = [_Stretch.integrate(signals, bias, r, flats, straight, rate_hz, params) for r in runs]
     longest = max(stretches, key=lambda x: len(x.q))
-    at = longest.first + len(longest.q) // 2
+    middle = longest.first + len(longest.q) // 2
     force = longest.forces.mean(axis=0)
-    q_at = multiply(_level(force), longest.q[at - longest.first])
+    q_at = multiply(_level(force), longest.q[middle - longest.first])
     norm = float(np.linalg.norm(force))
     q = estimate_orientation(
-        q_at, at, signals.gyr - bias, signals.acc, signals.valid, rate_hz, norm, attitude
+        q_at, middle, signals.gyr - bias, signals.acc, signals.valid, rate_hz, norm, attitude
     )
     return SensorInWalk(q, bias, norm, flats)
 
@@ -208,19 +208,19 @@ def _bias_step(
     """
     up = np.mean([rotate(conjugate(x.q), _direction(x)).mean(axis=0) for x in stretches], axis=0)
     up /= np.linalg.norm(up)
-    across = np.linalg.svd(up[None])[2][1:]
-    rows, wanted = [np.eye(2) / params.bias_sd], [-(across @ bias) / params.bias_sd]
+    horizontal = np.linalg.svd(up[None])[2][1:]
+    rows, targets = [np.eye(2) / params.bias_sd], [-(horizontal @ bias) / params.bias_sd]
     for x in stretches:
         run = (x.first, x.first + len(x.q))
         change = []
-        for axis in across:
+        for axis in horizontal:
             moved = _Stretch.integrate(signals, bias + PROBE * axis, run, flats, straight, rate_hz, params)
             change.append((moved.forces - x.forces) / PROBE)
         J = np.stack(change, axis=-1)
         rows.append((J - J.mean(axis=0)) * x.inverse_sd)
-        wanted.append(-(x.forces - x.forces.mean(axis=0)).reshape(-1) * x.inverse_sd)
+        targets.append(-(x.forces - x.forces.mean(axis=0)).reshape(-1) * x.inverse_sd)
     A = np.concatenate([r.reshape(-1, 2) for r in rows])
-    step = np.linalg.lstsq(A, np.concatenate(wanted), rcond=None)[0] @ across
+    step = np.linalg.lstsq(A, np.concatenate(targets), rcond=None)[0] @ horizontal
     turned, time = _heading_drift(stretches, straight, rate_hz)
     weight = time**2 / params.heading_sd**2
     drift = float((weight * turned / np.maximum(time, 1e-9)).sum() / (weight.sum() + params.bias_sd**-2))

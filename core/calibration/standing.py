@@ -120,10 +120,10 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
     ------
     SignalError `rest_too_short`, `not_still` or `no_rest`, with the quietest moment found.
     """
-    found = find_rest_windows(recording, params)
-    if rests := drop_false_rests(recording, found, params):
+    windows = find_rest_windows(recording, params)
+    if rests := drop_false_rests(recording, windows, params):
         return rests
-    if found:
+    if windows:
         raise SignalError(
             "not_still",
             Message(
@@ -131,23 +131,26 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
                 "{drift:.0f}°. Ask the person to stand still for 3 to 5 s before or after walking.",
                 drift=np.degrees(params.drift),
             ),
-            t_s=found[0][0],
+            t_s=windows[0][0],
         )
     quietest: list[tuple[float, Segment, float]] = []
     for segment, signals in recording.sensors.items():
         q = measure_quietness(signals, recording.rate_hz, params)
-        at = int(np.argmin(q.gyro))
-        quietest.append((float(q.gyro[at]), segment, float(recording.t_s[at])))
+        quietest_sample = int(np.argmin(q.gyro))
+        quietest.append((float(q.gyro[quietest_sample]), segment, float(recording.t_s[quietest_sample])))
     rate, segment, at_s = max(quietest)
     short = QuietParams(params.window_s / 2, params.gyro_limit, params.acc_std_limit, params.shortest_s / 2)
     limit = np.degrees(params.gyro_limit)
     if find_rest_windows(recording, short):
-        code, what = "rest_too_short", f"the sensors are still together for less than {params.shortest_s:g} s"
+        code, problem = (
+            "rest_too_short",
+            f"the sensors are still together for less than {params.shortest_s:g} s",
+        )
     elif rate < params.gyro_limit:
-        code, what = "no_rest", "every sensor is still at some time, but never all of them together"
+        code, problem = "no_rest", "every sensor is still at some time, but never all of them together"
     elif rate < WOBBLE_FACTOR * params.gyro_limit:
         code = "not_still"
-        what = Message(
+        problem = Message(
             "{segment} moves at {rate:.1f} °/s in its quietest second, limit {limit:.0f} °/s",
             segment=segment,
             rate=np.degrees(rate),
@@ -155,7 +158,7 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         )
     else:
         code = "no_rest"
-        what = Message(
+        problem = Message(
             "the quietest second of {segment} has {rate:.0f} °/s, limit {limit:.0f} °/s",
             segment=segment,
             rate=np.degrees(rate),
@@ -166,7 +169,7 @@ def find_rests(recording: UniformRecording, params: RestParams) -> tuple[Window,
         Message(
             "No quiet standing detected: {what}. Ask the person to stand still for 3 to 5 s before or "
             "after walking.",
-            what=what,
+            what=problem,
         ),
         sensor=segment if np.isfinite(rate) else None,
         t_s=at_s,
@@ -184,10 +187,13 @@ def drop_pauses(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> tup
     """
     reach = round(PAUSE_S * rate_hz)
 
-    def is_pause(rest: Window) -> bool:
-        part = index_window(rest, rate_hz)
-        before, after = moving[max(0, part.start - reach) : part.start], moving[part.stop : part.stop + reach]
-        return rest[1] - rest[0] < GOOD_S and bool(before.any() and after.any())
+    def is_pause(window: Window) -> bool:
+        part = index_window(window, rate_hz)
+        preceding, following = (
+            moving[max(0, part.start - reach) : part.start],
+            moving[part.stop : part.stop + reach],
+        )
+        return window[1] - window[0] < GOOD_S and bool(preceding.any() and following.any())
 
     return tuple(r for r in rests if not is_pause(r))
 
@@ -238,9 +244,9 @@ def choose_rest(rests: tuple[Window, ...], moving: Bools, rate_hz: float) -> Win
     walks = [(a / rate_hz, b / rate_hz) for a, b in find_runs(moving)]
     long = min(LONG_WALK_S, 0.5 * max((b - a for a, b in walks), default=0.0))
     start, end = next(((a, b) for a, b in walks if b - a >= long), (np.inf, np.inf))
-    before = [r for r in rests if r[1] <= start + 0.5 * GOOD_S]
-    after = [r for r in rests if r[0] >= end - 0.5 * GOOD_S]
-    near = [r for r in (*reversed(before), *after) if r[1] - r[0] >= GOOD_S]
+    earlier = [r for r in rests if r[1] <= start + 0.5 * GOOD_S]
+    later = [r for r in rests if r[0] >= end - 0.5 * GOOD_S]
+    near = [r for r in (*reversed(earlier), *later) if r[1] - r[0] >= GOOD_S]
     first, last = near[0] if near else max(rests, key=lambda r: r[1] - r[0])
     margin = MARGIN_S if last - first > 1.0 + 2 * MARGIN_S else 0.0
     if not walks or any(a > last - 0.5 * GOOD_S for a, _ in walks):
@@ -261,7 +267,7 @@ def stand_all(
     rate = recording.rate_hz
     longest = max(rests, key=lambda r: r[1] - r[0])
     longer = longest[1] - longest[0] > window[1] - window[0]
-    found = {}
+    by_segment = {}
     for s, x in recording.sensors.items():
         own = measure_standing(x, rate, window, s)
         if longer:
@@ -269,5 +275,5 @@ def stand_all(
             bias = x.gyr[part][x.valid[part]].mean(axis=0)
             if float(np.linalg.norm(bias - own.gyro_bias)) > params.bias:
                 own = replace(own, gyro_bias=bias)
-        found[s] = own
-    return found
+        by_segment[s] = own
+    return by_segment

@@ -49,11 +49,11 @@ def find_standing_legs(calibrated: CalibratedRecording) -> dict[Side, Bools]:
     legs_down = {
         side: sum(_measure_up(calibrated, s, 1) for s in (SHANK[side], THIGH[side])) for side in legs
     }
-    above = THIGH_AND_SHANK * height * (legs_down["right"] - legs_down["left"])
-    above = above - HIPS * height * _measure_up(calibrated, "pelvis", 2)
+    height_difference = THIGH_AND_SHANK * height * (legs_down["right"] - legs_down["left"])
+    height_difference = height_difference - HIPS * height * _measure_up(calibrated, "pelvis", 2)
     standing = index_window(calibrated.calibration.zero, calibrated.recording.rate_hz)
-    above = above - above[standing].mean()
-    return {"left": above <= LIFTED_M, "right": above >= -LIFTED_M}
+    height_difference = height_difference - height_difference[standing].mean()
+    return {"left": height_difference <= LIFTED_M, "right": height_difference >= -LIFTED_M}
 
 
 def _measure_up(calibrated: CalibratedRecording, segment: Segment, axis: int) -> Floats:
@@ -62,9 +62,9 @@ def _measure_up(calibrated: CalibratedRecording, segment: Segment, axis: int) ->
 
     recording = calibrated.recording
     signals, R = recording.sensors[segment], calibrated.calibration.segments[segment].R_segment_sensor
-    known = np.flatnonzero(signals.valid)
-    force = signals.acc[known] @ R.T
-    force = np.stack([np.interp(np.arange(len(signals.valid)), known, x) for x in force.T], axis=1)
+    indices = np.flatnonzero(signals.valid)
+    force = signals.acc[indices] @ R.T
+    force = np.stack([np.interp(np.arange(len(signals.valid)), indices, x) for x in force.T], axis=1)
     width = max(1, round(SMOOTH_S * recording.rate_hz))
     for _ in range(2):
         force = uniform_filter1d(force, width, axis=0, mode="nearest")

@@ -129,11 +129,12 @@ def find_worn_standing(recording: UniformRecording, params: TableTopParams | Non
             "The sensors are not all still when the trial starts; start the recording before touching them.",
             t_s=0.0,
         )
-    for rest in rests[1:]:
-        if rest[1] - rest[0] >= params.stand_s and all(
-            _turned(x, recording.rate_hz, rests[0], rest) > params.worn for x in recording.sensors.values()
+    for candidate in rests[1:]:
+        if candidate[1] - candidate[0] >= params.stand_s and all(
+            _turned(x, recording.rate_hz, rests[0], candidate) > params.worn
+            for x in recording.sensors.values()
         ):
-            return rest
+            return candidate
     raise CalibrationError(
         "body_not_still",
         Message(
@@ -242,13 +243,13 @@ def _find_ends(
 
 
 def _find_stillest(
-    recording: UniformRecording, segment: Segment, rest: Window, params: TableTopParams
+    recording: UniformRecording, segment: Segment, window: Window, params: TableTopParams
 ) -> tuple[Window, float]:
     """The part of a rest with the least variation of the rate, and its standard deviation, rad/s.
 
     A rest may end with the onset of a slow movement, which must not enter the bias.
     """
-    part, width = index_window(rest, recording.rate_hz), round(params.still_s * recording.rate_hz)
+    part, width = index_window(window, recording.rate_hz), round(params.still_s * recording.rate_hz)
     gyr = recording.sensors[segment].gyr
     starts = range(part.start, max(part.start, part.stop - width) + 1, max(1, width // 10))
     spread = [float(np.sqrt(gyr[a : a + width].var(axis=0).sum())) for a in starts]
@@ -291,10 +292,10 @@ def _carry(
     gyr = np.ascontiguousarray(signals.gyr[part.stop - 1 :] - bias)
     q = np.empty((len(gyr), 4))
     integrate_turns(gyr, 1.0 / rate_hz, start, q)
-    rest = index_window((max(body[0], body[1] - params.mean_s), body[1]), rate_hz)
-    found = mean(q[rest.start - part.stop + 1 : rest.stop - part.stop + 1])
-    level = _turn_upright(rotate(found, signals.acc[rest].mean(axis=0)))
-    return multiply(level, found), float(2.0 * acos(min(1.0, abs(float(level[0])))))
+    standing = index_window((max(body[0], body[1] - params.mean_s), body[1]), rate_hz)
+    orientation = mean(q[standing.start - part.stop + 1 : standing.stop - part.stop + 1])
+    level = _turn_upright(rotate(orientation, signals.acc[standing].mean(axis=0)))
+    return multiply(level, orientation), float(2.0 * acos(min(1.0, abs(float(level[0])))))
 
 
 def _turn_upright(force: Floats) -> Floats:

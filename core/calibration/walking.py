@@ -71,11 +71,11 @@ def turning_mask(
     ----------
     q : segment → (n, 4) sensor to its own z-up world.
     """
-    worn = turn_sensors(recording)
+    turn_segments = turn_sensors(recording)
     rate = np.zeros(len(recording.t_s))
-    for s in worn:
-        rate += rotate(q[s], recording.sensors[s].gyr - biases[s])[:, 2] / len(worn)
-    cutoff = params.turn_cutoff_hz if worn[0] in TRUNK else 0.5 * params.turn_cutoff_hz
+    for s in turn_segments:
+        rate += rotate(q[s], recording.sensors[s].gyr - biases[s])[:, 2] / len(turn_segments)
+    cutoff = params.turn_cutoff_hz if turn_segments[0] in TRUNK else 0.5 * params.turn_cutoff_hz
     turning = np.abs(low_pass(rate, cutoff, recording.rate_hz)) > params.turn_rate
     reach = round(params.turn_margin_s * recording.rate_hz)
     for a, b in find_runs(turning):

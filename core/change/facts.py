@@ -65,11 +65,11 @@ class SortedChanges:
 
 def name_fact(name: str, side: Side | None) -> Fact:
     """Group that a parameter of one side belongs to; parameters shared by both sides have no side."""
-    to, of = SAME_AS.get(name, (name, "own"))
+    to, relation = SAME_AS.get(name, (name, "own"))
     entry = CATALOGUE.get(to)
-    if of == "take" or side is None or (entry is not None and entry.shared):
+    if relation == "take" or side is None or (entry is not None and entry.shared):
         return to, None
-    return to, OTHER[side] if of == "other" else side
+    return to, OTHER[side] if relation == "other" else side
 
 
 def sort_changes(changes: Sequence[Change]) -> SortedChanges:
@@ -81,13 +81,13 @@ def sort_changes(changes: Sequence[Change]) -> SortedChanges:
     for c in changes:
         if c.difference is not None:
             facts.setdefault(name_fact(c.name, c.side), []).append(c)
-    real, within, unjudged = [], 0, 0
-    for said in facts.values():
-        beyond = [c for c in said if c.verdict in {"real_change", "clinically_relevant"}]
+    real, within_error, unjudged = [], 0, 0
+    for group in facts.values():
+        beyond = [c for c in group if c.verdict in {"real_change", "clinically_relevant"}]
         if beyond:
             real.append(ChangedFact(beyond[0], tuple(beyond[1:])))
-        elif any(c.verdict is not None for c in said):
-            within += 1
+        elif any(c.verdict is not None for c in group):
+            within_error += 1
         else:
             unjudged += 1
-    return SortedChanges(tuple(real), within, unjudged)
+    return SortedChanges(tuple(real), within_error, unjudged)

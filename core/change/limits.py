@@ -87,7 +87,7 @@ def find_detectable_change(name: str, baseline: float, limb: Limb | None = None)
     entry = CATALOGUE.get(name)
     key = None if entry is None else entry.change
     if key == "speed":
-        return next(limit for below, limit in _SPEED if baseline < below)
+        return next(limit for upper_mps, limit in _SPEED if baseline < upper_mps)
     if key in _BY_LIMB:
         return _of_limb(_BY_LIMB[key][0], limb)
     return None if key is None else _MDC[key]

@@ -78,8 +78,8 @@ class Change:
 
 
 def parameter_changes(
-    before: Sequence[Parameter],
-    after: Sequence[Parameter],
+    previous: Sequence[Parameter],
+    current: Sequence[Parameter],
     affected: Side | None = None,
     norms: tuple[Mapping[str, NormValue], Mapping[str, NormValue]] | None = None,
     own: Mapping[str, Repeatability] | None = None,
@@ -92,7 +92,7 @@ def parameter_changes(
     norms : reference values by name, per session at its own speed; without them changes have no direction.
     own : measurement error of this clinic by name; takes precedence over published limits.
     """
-    earlier = {(p.name, p.side): p for p in before}
+    earlier = {(p.name, p.side): p for p in previous}
     of_before, of_after = norms or ({}, {})
     return tuple(
         _parameter(
@@ -102,15 +102,15 @@ def parameter_changes(
             (of_before.get(p.name), of_after.get(p.name)),
             (own or {}).get(p.name),
         )
-        for p in after
+        for p in current
     )
 
 
-def ratio_changes(before: Sequence[Symmetry], after: Sequence[Symmetry]) -> tuple[Change, ...]:
+def ratio_changes(previous: Sequence[Symmetry], current: Sequence[Symmetry]) -> tuple[Change, ...]:
     """Compare the side ratios of two sessions; limits exist only for ratios affected / unaffected."""
-    earlier = {s.name: s for s in before}
+    earlier = {s.name: s for s in previous}
     changes = []
-    for s in after:
+    for s in current:
         was = earlier.get(s.name)
         alike = was is not None and (was.first, was.reference) == (s.first, s.reference)
         old = was.ratio if was is not None and alike else None
@@ -121,15 +121,15 @@ def ratio_changes(before: Sequence[Symmetry], after: Sequence[Symmetry]) -> tupl
 
 
 def score_changes(
-    before: Sequence[Score], after: Sequence[Score], own: Mapping[str, Repeatability] | None = None
+    previous: Sequence[Score], current: Sequence[Score], own: Mapping[str, Repeatability] | None = None
 ) -> tuple[Change, ...]:
     """Compare the scores of two sessions, raw with raw and shape with shape; names as `score_name`.
 
     No source reports an MDC of the GPS; without the clinic's own there is no verdict.
     """
-    earlier = {(score_name(s), s.side): s.value for s in before}
+    earlier = {(score_name(s), s.side): s.value for s in previous}
     changes = []
-    for s in after:
+    for s in current:
         name = score_name(s)
         mine = (own or {}).get(name)
         change = _plain(name, s.side, s.unit, earlier.get((name, s.side)), s.value)
@@ -195,14 +195,14 @@ def _strides(old: Parameter, new: Parameter) -> float:
     return difference_half_width(of_strides, old.u_own, new.u_own)
 
 
-def _plain(name: str, side: Side | None, unit: str, before: float | None, after: float | None) -> Change:
-    difference = None if before is None or after is None else after - before
+def _plain(name: str, side: Side | None, unit: str, previous: float | None, current: float | None) -> Change:
+    difference = None if previous is None or current is None else current - previous
     return Change(
         name=name,
         side=side,
         unit=unit,
-        before=before,
-        after=after,
+        before=previous,
+        after=current,
         difference=difference,
         verdict=None,
         limit=None,

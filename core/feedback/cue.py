@@ -145,8 +145,8 @@ class GuardState:
         """watch: a side effect exceeds its limit; unknown: none can be judged yet."""
         if self.other.beyond or self.gps.beyond:
             return "watch"
-        known = [e for e in (self.other, self.gps) if e.reason is None]
-        return "ok" if known else "unknown"
+        judged_effects = [e for e in (self.other, self.gps) if e.reason is None]
+        return "ok" if judged_effects else "unknown"
 
 
 @dataclass(frozen=True)

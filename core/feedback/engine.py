@@ -56,9 +56,9 @@ class FeedbackEngine:
         self._baseline = baseline or Baseline()
         self._guard = GuardWatch(prescription, self._baseline)
         self._ladder = Ladder(zones, prescription.progression, self._baseline)
-        after = self._baseline.after_training
-        self._opening: Literal["retention", "baseline"] = "retention" if after else "baseline"
-        block = prescription.schedule.retention_strides if after else 0
+        has_retention = self._baseline.after_training
+        self._opening: Literal["retention", "baseline"] = "retention" if has_retention else "baseline"
+        block = prescription.schedule.retention_strides if has_retention else 0
         self._opening_left = block if self._ladder.known else max(block, OPENING)
         self._opened: list[float] = []
         self._on, self._paused, self._stale = True, False, False
@@ -143,7 +143,7 @@ class FeedbackEngine:
     @property
     def state(self) -> FeedbackState:
         """State of the training."""
-        at = self._place()
+        slot = self._place()
         training = self._opening_left == 0 and self._stopped is None
         low, high = self._ladder.limits
         return FeedbackState(
@@ -151,14 +151,14 @@ class FeedbackEngine:
             paused=self._paused,
             stale=self._stale,
             stopped=self._stopped,
-            phase=self._phase(at),
+            phase=self._phase(slot),
             level=self._ladder.level,
             zone_low=low,
             zone_high=high,
             strides=self._strides,
-            share_pct=at.share_pct if training else 0,
-            next_probe=at.next_probe if training else None,
-            block_left=self._opening_left or (at.block_left if training else None),
+            share_pct=slot.share_pct if training else 0,
+            next_probe=slot.next_probe if training else None,
+            block_left=self._opening_left or (slot.block_left if training else None),
             in_zone=self._ladder.share("in"),
             window_n=self._ladder.window_n,
             with_feedback=self._with.summary,
@@ -166,26 +166,26 @@ class FeedbackEngine:
             guard=self._guard.state,
         )
 
-    def _phase(self, at: ScheduleSlot) -> Phase:
+    def _phase(self, slot: ScheduleSlot) -> Phase:
         if self._opening_left:
             return self._opening
         if self._stopped is not None:
             return "stopped"
-        return "probe" if at.block is not None else "training"
+        return "probe" if slot.block is not None else "training"
 
     def _place(self) -> ScheduleSlot:
         return find_slot(self.prescription.schedule, self._position)
 
     def _judge(self, stride: StrideLike, value: float, late: bool) -> Cue:
         zone = self._ladder.zone(value)
-        at = self._place()
-        why = self._why_not(at, zone, late)
-        running = self._running(why)
-        if running and at.block is None:
+        slot = self._place()
+        reason = self._why_not(slot, zone, late)
+        running = self._running(reason)
+        if running and slot.block is None:
             self._ladder.add_stride(zone)
         low, high = self._ladder.limits
-        shown = why is None
-        sound = shown and "tone" in self.prescription.modes
+        is_shown = reason is None
+        sound = is_shown and "tone" in self.prescription.modes
         return Cue(
             n=stride.n,
             side=stride.side,
@@ -194,17 +194,17 @@ class FeedbackEngine:
             value=value,
             error_sd=self._ladder.zones.error_sd(value),
             zone=zone,
-            shown=shown,
-            why_not=why,
+            shown=is_shown,
+            why_not=reason,
             level=self._ladder.level,
             zone_low=low,
             zone_high=high,
             tone=self._ladder.zones.tone(value, self._ladder.level) if sound else None,
-            block=at.block if running else None,
+            block=slot.block if running else None,
             share_in_zone_last20=self._ladder.share("in"),
         )
 
-    def _why_not(self, at: ScheduleSlot, zone: Zone, late: bool) -> WhyNot | None:
+    def _why_not(self, slot: ScheduleSlot, zone: Zone, late: bool) -> WhyNot | None:
         """The first applicable reason not to show this stride."""
         p = self.prescription
         reasons: tuple[tuple[bool, WhyNot], ...] = (
@@ -213,16 +213,16 @@ class FeedbackEngine:
             (self._paused, "paused"),
             (self._stale or late, "stale"),
             (self._stopped is not None, "stopped"),
-            (at.block is not None, "probe"),
-            (not at.shown, "faded"),
+            (slot.block is not None, "probe"),
+            (not slot.shown, "faded"),
             (p.positive_only and zone != "in", "positive_only"),
             (p.bandwidth and zone == "in", "bandwidth"),
         )
-        return next((why for holds, why in reasons if holds), None)
+        return next((reason for holds, reason in reasons if holds), None)
 
-    def _running(self, why: WhyNot | None) -> bool:
+    def _running(self, reason: WhyNot | None) -> bool:
         """Whether schedule and level rule advance with this stride."""
-        return why in {None, "probe", "faded", "positive_only", "bandwidth"}
+        return reason in {None, "probe", "faded", "positive_only", "bandwidth"}
 
     def _count(self, cue: Cue, value: float) -> None:
         """Advance by one stride."""

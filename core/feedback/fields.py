@@ -37,8 +37,8 @@ class RecordFields:
 
     def part(self, name: str) -> RecordFields:
         """A nested object; absent = all defaults."""
-        found = self._take(name, {})
-        return RecordFields(name if self._path == "prescription" else f"{self._path}.{name}", found)
+        data = self._take(name, {})
+        return RecordFields(name if self._path == "prescription" else f"{self._path}.{name}", data)
 
     def number(self, name: str, default: float, least: float, most: float) -> float:
         """A finite number within limits."""
@@ -48,8 +48,8 @@ class RecordFields:
         self, name: str, default: float | None, least: float = -inf, most: float = inf
     ) -> float | None:
         """A finite number within limits, or null."""
-        found = self._take(name, default)
-        return None if found is None else self._number(name, found, least, most)
+        value = self._take(name, default)
+        return None if value is None else self._number(name, value, least, most)
 
     def whole(self, name: str, default: int, least: int, most: int) -> int:
         """A whole number within limits."""
@@ -57,47 +57,47 @@ class RecordFields:
 
     def whole_or_none(self, name: str, default: int | None, least: int, most: int) -> int | None:
         """A whole number within limits, or null."""
-        found = self._take(name, default)
-        return None if found is None else self._whole(name, found, least, most)
+        value = self._take(name, default)
+        return None if value is None else self._whole(name, value, least, most)
 
     def flag(self, name: str, default: bool) -> bool:
         """A boolean."""
-        found = self._take(name, default)
-        if not isinstance(found, bool):
-            raise self._wrong(name, found, "true or false")
-        return found
+        value = self._take(name, default)
+        if not isinstance(value, bool):
+            raise self._wrong(name, value, "true or false")
+        return value
 
     def choice(self, name: str, allowed: Sequence[Name], default: object = _MISSING) -> Name:
         """One of the allowed values."""
-        found = self._take(name, default)
+        chosen = self._take(name, default)
         for value in allowed:
-            if found == value and type(found) is type(value):
+            if chosen == value and type(chosen) is type(value):
                 return value
         words = ", ".join("null" if a is None else str(a) for a in allowed)
-        raise self._wrong(name, None if found is _MISSING else found, f"one of {words}")
+        raise self._wrong(name, None if chosen is _MISSING else chosen, f"one of {words}")
 
     def choices(self, name: str, allowed: Sequence[Name], default: Sequence[Name]) -> tuple[Name, ...]:
         """At least one of the allowed values."""
-        found = self._take(name, default)
-        if isinstance(found, list | tuple) and found and all(x in allowed for x in found):
-            return tuple(found)
-        raise self._wrong(name, found, f"a list of at least one of {', '.join(map(str, allowed))}")
+        values = self._take(name, default)
+        if isinstance(values, list | tuple) and values and all(x in allowed for x in values):
+            return tuple(values)
+        raise self._wrong(name, values, f"a list of at least one of {', '.join(map(str, allowed))}")
 
     def percents(self, name: str, default: tuple[int, ...]) -> tuple[int, ...]:
         """A list of whole percentages."""
-        found = self._take(name, default)
-        if isinstance(found, list | tuple) and 1 <= len(found) <= 20:
-            numbers = [x for x in found if isinstance(x, int) and not isinstance(x, bool) and 0 <= x <= 100]
-            if len(numbers) == len(found):
+        values = self._take(name, default)
+        if isinstance(values, list | tuple) and 1 <= len(values) <= 20:
+            numbers = [x for x in values if isinstance(x, int) and not isinstance(x, bool) and 0 <= x <= 100]
+            if len(numbers) == len(values):
                 return tuple(numbers)
-        raise self._wrong(name, found, "a list of 1 to 20 whole percents from 0 to 100")
+        raise self._wrong(name, values, "a list of 1 to 20 whole percents from 0 to 100")
 
     def text(self, name: str, default: str | None) -> str | None:
         """A line of text."""
-        found = self._take(name, default)
-        if found is None or (isinstance(found, str) and len(found) <= 500):
-            return found
-        raise self._wrong(name, found, "text of at most 500 characters")
+        value = self._take(name, default)
+        if value is None or (isinstance(value, str) and len(value) <= 500):
+            return value
+        raise self._wrong(name, value, "text of at most 500 characters")
 
     def refuse_unknown(self) -> None:
         """Reject fields that were not read: a misspelt field must not be silently ignored."""
@@ -113,32 +113,32 @@ class RecordFields:
                 ),
             )
 
-    def _number(self, name: str, found: object, least: float, most: float) -> float:
-        if isinstance(found, bool) or not isinstance(found, int | float) or not isfinite(found):
-            raise self._wrong(name, found, "a number")
-        if not least <= found <= most:
-            raise self._wrong(name, found, f"a number from {least:g} to {most:g}")
-        return float(found)
+    def _number(self, name: str, value: object, least: float, most: float) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise self._wrong(name, value, "a number")
+        if not least <= value <= most:
+            raise self._wrong(name, value, f"a number from {least:g} to {most:g}")
+        return float(value)
 
-    def _whole(self, name: str, found: object, least: int, most: int) -> int:
-        if isinstance(found, float) and found.is_integer():
-            found = int(found)
-        if isinstance(found, bool) or not isinstance(found, int) or not least <= found <= most:
-            raise self._wrong(name, found, f"a whole number from {least} to {most}")
-        return found
+    def _whole(self, name: str, value: object, least: int, most: int) -> int:
+        if isinstance(value, float) and value.is_integer():
+            value = int(value)
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise self._wrong(name, value, f"a whole number from {least} to {most}")
+        return value
 
     def _take(self, name: str, default: object) -> Any:
         self._read.add(name)
         return self._data.get(name, default)
 
-    def _wrong(self, name: str, found: object, expected: str) -> ParameterError:
+    def _wrong(self, name: str, value: object, expected: str) -> ParameterError:
         return ParameterError(
             CODE,
             Message(
                 "{path}.{name} is {found}. Expected {expected}.",
                 path=self._path,
                 name=name,
-                found=repr(found),
+                found=repr(value),
                 expected=expected,
             ),
         )

@@ -76,8 +76,8 @@ class GuardWatch:
     def _gps(self) -> SideEffect:
         limit = self._guard.gps_rise_deg
         if any(not ends.known for ends in self._curves.values()):
-            seen = any(len(e.first) for e in self._values.values())
-            lacks = seen and not any(len(e.first) for e in self._curves.values())
+            has_strides = any(len(e.first) for e in self._values.values())
+            lacks = has_strides and not any(len(e.first) for e in self._curves.values())
             return SideEffect(reason="joint_missing" if lacks else "too_few_strides")
         first = _gps_sagittal({s: np.mean(e.first, axis=0) for s, e in self._curves.items()})
         last = _gps_sagittal({s: np.mean(e.last, axis=0) for s, e in self._curves.items()})
@@ -112,12 +112,12 @@ def _gps_sagittal(means: Mapping[Side, Floats]) -> float:
     are relative to standing.
     """
     reference = adult_reference().mean_deg
-    found = {
+    scores = {
         side: {
             v: float(gvs(row, reference[v], "offset_removed")) for v, row in zip(SAGITTAL, rows, strict=True)
         }
         for side, rows in means.items()
     }
-    profile = overall_profile(found, SAGITTAL)
+    profile = overall_profile(scores, SAGITTAL)
     assert profile is not None  # noqa: S101 - all of SAGITTAL of both sides are there
     return profile

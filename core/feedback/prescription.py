@@ -177,7 +177,7 @@ def _prescription(data: Mapping[str, object]) -> Prescription:
     parameter = f.choice("parameter", list_trainable())
     side = f.choice("side", (*SIDES, None), None)
     modes = tuple(dict.fromkeys(f.choices("modes", MODES, ("bar",))))
-    made = Prescription(
+    prescription = Prescription(
         parameter,
         side,
         target,
@@ -191,7 +191,7 @@ def _prescription(data: Mapping[str, object]) -> Prescription:
         _guard(f.part("guard")),
     )
     f.refuse_unknown()
-    if made.positive_only and made.bandwidth:
+    if prescription.positive_only and prescription.bandwidth:
         raise _refused(
             "positive_only and bandwidth are both on, and leave no stride to show. Expected at most one."
         )
@@ -200,7 +200,7 @@ def _prescription(data: Mapping[str, object]) -> Prescription:
             "target.source is own_better_side while both sides are trained. Expected side left or right, or "
             "another source."
         )
-    return made
+    return prescription
 
 
 def _target(f: RecordFields) -> Target:
@@ -217,7 +217,7 @@ def _target(f: RecordFields) -> Target:
 
 def _schedule(f: RecordFields) -> Schedule:
     d = Schedule()
-    found = Schedule(
+    schedule = Schedule(
         f.choice("kind", KINDS, d.kind),
         f.percents("shares_pct", d.shares_pct),
         f.whole("strides_per_share", d.strides_per_share, 1, 10_000),
@@ -226,16 +226,16 @@ def _schedule(f: RecordFields) -> Schedule:
         f.whole("retention_strides", d.retention_strides, 0, 1000),
     )
     f.refuse_unknown()
-    if list(found.shares_pct) != sorted(found.shares_pct, reverse=True):
+    if list(schedule.shares_pct) != sorted(schedule.shares_pct, reverse=True):
         raise _refused(
-            f"schedule.shares_pct is {list(found.shares_pct)}. Expected no share above the one before."
+            f"schedule.shares_pct is {list(schedule.shares_pct)}. Expected no share above the one before."
         )
-    return found
+    return schedule
 
 
 def _progression(f: RecordFields) -> Progression:
     d = Progression()
-    found = Progression(
+    progression = Progression(
         f.flag("automatic", d.automatic),
         f.whole("window", d.window, 5, 200),
         f.number("share", d.share, 0.05, 0.99),
@@ -245,33 +245,34 @@ def _progression(f: RecordFields) -> Progression:
         f.choice("worse", ("low", "high", None), None),
     )
     f.refuse_unknown()
-    if found.share + found.away_share < 1.0:
+    if progression.share + progression.away_share < 1.0:
         raise _refused(
-            f"progression.share is {found.share:g} and away_share {found.away_share:g}: the same strides "
+            f"progression.share is {progression.share:g} and away_share "
+            f"{progression.away_share:g}: the same strides "
             "could ask for harder and easier. Expected a sum of at least 1."
         )
-    return found
+    return progression
 
 
 def _stop_rule(f: RecordFields) -> StopRule:
     d = StopRule()
-    found = StopRule(
+    rule = StopRule(
         f.whole_or_none("max_strides", d.max_strides, 1, 100_000),
         f.number_or_none("max_minutes", d.max_minutes, 0.5, 240.0),
         f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
     )
     f.refuse_unknown()
-    return found
+    return rule
 
 
 def _guard(f: RecordFields) -> SideEffectGuard:
     d = SideEffectGuard()
-    found = SideEffectGuard(
+    guard = SideEffectGuard(
         f.number_or_none("other_change", d.other_change, 0.0),
         f.number_or_none("gps_rise_deg", d.gps_rise_deg, 0.1, 60.0),
     )
     f.refuse_unknown()
-    return found
+    return guard
 
 
 def _refused(message: str) -> ParameterError:

@@ -37,15 +37,15 @@ def find_slot(schedule: Schedule, position: int) -> ScheduleSlot:
     every, probes = schedule.probe_every, schedule.probe_strides
     trained, block, next_probe, left = position, None, None, None
     if every is not None:
-        cycle, at = divmod(position, every + probes)
-        trained = cycle * every + min(at, every)
-        if at >= every:
-            block, left = cycle + 1, every + probes - at
+        cycle, place = divmod(position, every + probes)
+        trained = cycle * every + min(place, every)
+        if place >= every:
+            block, left = cycle + 1, every + probes - place
         else:
-            next_probe = every - at
+            next_probe = every - place
     share, index = _step(schedule, trained)
-    shown = block is None and (index + 1) * share // 100 > index * share // 100
-    return ScheduleSlot(shown, share, block, next_probe, left)
+    is_shown = block is None and (index + 1) * share // 100 > index * share // 100
+    return ScheduleSlot(is_shown, share, block, next_probe, left)
 
 
 def _step(schedule: Schedule, trained: int) -> tuple[int, int]:

@@ -112,8 +112,8 @@ def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSpl
     matched: list[MatchedStride] = []
     unmatched = left_out = 0
     starts = {side: _Starts(s for s in strides if s.side == side) for side in SIDES}
-    once = {cue.n: cue for cue in reversed(cues)}
-    for cue in sorted(once.values(), key=lambda c: c.start_s):
+    by_number = {cue.n: cue for cue in reversed(cues)}
+    for cue in sorted(by_number.values(), key=lambda c: c.start_s):
         stride = starts[cue.side].take(cue.start_s)
         if stride is None:
             unmatched += 1
@@ -133,7 +133,7 @@ def split(strides: Sequence[AnalysedStride], cues: Sequence[Cue]) -> FeedbackSpl
         difference.add(m.cue.value - m.value, False)
     return FeedbackSplit(
         strides=tuple(matched),
-        kinds={kind: summarise_strides(found) for kind, found in kinds.items()},
+        kinds={kind: summarise_strides(members) for kind, members in kinds.items()},
         probes=_probes(matched),
         levels=_levels(matched),
         end=summarise_strides([m for m in matched if classify_stride(m.cue) in {"with", "faded"}][-END:]),
@@ -170,19 +170,19 @@ class _Starts:
         free = [i for i in range(first, last) if i not in self._taken]
         if not free:
             return None
-        found = min(free, key=lambda i: abs(self._starts[i] - start_s))
-        self._taken.add(found)
-        return self._strides[found]
+        nearest = min(free, key=lambda i: abs(self._starts[i] - start_s))
+        self._taken.add(nearest)
+        return self._strides[nearest]
 
 
 def _probes(matched: Sequence[MatchedStride]) -> tuple[ProbeBlock, ...]:
     blocks: list[ProbeBlock] = []
     for number in sorted({m.cue.block for m in matched if m.cue.block is not None}):
         own = [i for i, m in enumerate(matched) if m.cue.block == number]
-        before = [m for m in matched[: own[0]] if classify_stride(m.cue) in {"with", "faded"}][-len(own) :]
+        preceding = [m for m in matched[: own[0]] if classify_stride(m.cue) in {"with", "faded"}][-len(own) :]
         probe = [matched[i] for i in own]
         blocks.append(
-            ProbeBlock(number, probe[0].cue.start_s, summarise_strides(probe), summarise_strides(before))
+            ProbeBlock(number, probe[0].cue.start_s, summarise_strides(probe), summarise_strides(preceding))
         )
     return tuple(blocks)
 

@@ -20,9 +20,9 @@ class RunningStatistics:
         """Add one stride."""
         self._n += 1
         self._inside += inside
-        away = value - self._mean
-        self._mean += away / self._n
-        self._squares += away * (value - self._mean)
+        deviation = value - self._mean
+        self._mean += deviation / self._n
+        self._squares += deviation * (value - self._mean)
 
     @property
     def summary(self) -> Summary:

@@ -51,11 +51,11 @@ class Zones:
     def zone(self, value: float, level: int) -> Zone:
         """Green, yellow with its direction, or red with its direction."""
         low, high = self.limits(level)
-        beside = self.width * self.sd
+        yellow = self.width * self.sd
         if value < low:
-            return "low" if value < low - beside else "near_low"
+            return "low" if value < low - yellow else "near_low"
         if value > high:
-            return "high" if value > high + beside else "near_high"
+            return "high" if value > high + yellow else "near_high"
         return "in"
 
     def start_level(self, usual: float) -> int:

@@ -76,12 +76,12 @@ def compare_filters(
     EstimationError `nothing_calibrated`; `no_orientations` for squats; `no_filter_ran` if every filter
     failed. FormatError as `place_reference`.
     """
-    calibrated, alone, own = _require_orientations(analysis)
+    calibrated, single, own = _require_orientations(analysis)
     recording = calibrated.recording
     keep = choose_samples(len(recording.t_s), recording.rate_hz)
-    signals = prepare_signals(calibrated, alone, magnetometer=request.magnetometer)
+    signals = prepare_signals(calibrated, single, magnetometer=request.magnetometer)
     signals = {s: x for s, x in signals.items() if s in own.q}
-    kept = _Kept(
+    compared = _Kept(
         recording.t_s[keep],
         recording.rate_hz / keep.step,
         calibrated.calibration.zero,
@@ -94,35 +94,35 @@ def compare_filters(
         runs[name] = run_filter(name, signals, recording.rate_hz, keep, clock)
     _check_any_ran(runs)
     progress("comparing", 1.0)
-    angles = {name: kept.measure_angles(run.q).angles for name, run in runs.items() if run.q}
-    chain_angles = kept.measure_angles(kept.chain)
-    spreads, medians = _spread_segments(runs, kept)
+    angles = {name: compared.measure_angles(run.q).angles for name, run in runs.items() if run.q}
+    chain_angles = compared.measure_angles(compared.chain)
+    spreads, medians = _spread_segments(runs, compared)
     spreads |= spread_of_angles(list(angles.values()), chain_angles.angles)
-    every: dict[str | None, Mapping[Segment, Floats]] = {None: kept.chain}
+    every: dict[str | None, Mapping[Segment, Floats]] = {None: compared.chain}
     every.update((name, run.q) for name, run in runs.items())
     scores = None
     if reference is not None:
-        placed = place_reference(reference, analysis.source.segments, medians, kept.valid, kept.t_s)
+        placed = place_reference(reference, analysis.source.segments, medians, compared.valid, compared.t_s)
         measured: dict[str | None, Mapping[str, Floats]] = {None: chain_angles.angles}
         measured.update(angles.items())
-        scores = _score(reference, placed, every, measured, kept.valid, chain_angles.zero_offset)
-    own_run = FilterRun(kept.chain, None, ())
-    agreements = [_agree(name, run, medians, kept) for name, run in ((None, own_run), *runs.items())]
+        scores = _score(reference, placed, every, measured, compared.valid, chain_angles.zero_offset)
+    own_run = FilterRun(compared.chain, None, ())
+    agreements = [_agree(name, run, medians, compared) for name, run in ((None, own_run), *runs.items())]
     return FilterComparison(
         request,
-        kept.t_s,
+        compared.t_s,
         tuple(signals),
         {s: sum(x.side == s and x.excluded_reason is None for x in strides.strides) for s in SIDES},
         tuple(agreements),
         tuple(
-            cut_into_cycles(name, n, sd, reach, kept.t_s, strides)
+            cut_into_cycles(name, n, sd, reach, compared.t_s, strides)
             for name, (sd, reach, n) in spreads.items()
             if np.isfinite(sd).any()
         ),
         scores,
         _tell(agreements),
         every,
-        kept.valid,
+        compared.valid,
     )
 
 
@@ -130,27 +130,28 @@ def _require_orientations(analysis: TakeAnalysis) -> tuple[CalibratedRecording, 
     """The calibrated recording, its single-sensor orientations, and the final ones of the analysis."""
     mounted = analysis.mounted
     calibrated = analysis.calibrated if mounted is None else mounted.calibrated
-    alone = analysis.fused if mounted is None else mounted.orientations
+    single = analysis.fused if mounted is None else mounted.orientations
     own = analysis.orientations
-    if calibrated is None or alone is None or own is None:
+    if calibrated is None or single is None or own is None:
         if analysis.legs is not None:
             raise EstimationError(
                 "no_orientations",
                 "Squats are analysed with a kinematic chain of the leg; filters can be compared on walks "
                 "only.",
             )
-        why = "" if analysis.problem is None else f" {analysis.problem.message}"
+        reason = "" if analysis.problem is None else f" {analysis.problem.message}"
         raise EstimationError(
-            "nothing_calibrated", Message("No sensor in this trial is calibrated.{why}", why=why)
+            "nothing_calibrated", Message("No sensor in this trial is calibrated.{why}", why=reason)
         )
-    return calibrated, alone, own
+    return calibrated, single, own
 
 
 def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
     if not any(run.q for run in runs.values()):
-        told = next(run.told[0].message for run in runs.values())
+        first_message = next(run.told[0].message for run in runs.values())
         raise EstimationError(
-            "no_filter_ran", Message("No filter gave a result. The first reported: {told}", told=told)
+            "no_filter_ran",
+            Message("No filter gave a result. The first reported: {told}", told=first_message),
         )
 
 
@@ -176,64 +177,64 @@ class _Kept:
 
 
 def _spread_segments(
-    runs: Mapping[str, FilterRun], kept: _Kept
+    runs: Mapping[str, FilterRun], compared: _Kept
 ) -> tuple[dict[str, tuple[Floats, Floats, int]], dict[Segment, Floats]]:
     """Spread of inclination and heading by quantity: SD, range, number of filters; and their medians."""
     spreads: dict[str, tuple[Floats, Floats, int]] = {}
     medians = {}
-    for s, near in kept.chain.items():
+    for s, near in compared.chain.items():
         rows = [run.q[s] for run in runs.values() if s in run.q]
         if rows:
-            found, medians[s] = spread_of_segment(s, np.stack(rows), near, kept.valid[s])
-            spreads |= {name: (*pair, len(rows)) for name, pair in found.items()}
+            spread, medians[s] = spread_of_segment(s, np.stack(rows), near, compared.valid[s])
+            spreads |= {name: (*pair, len(rows)) for name, pair in spread.items()}
     return spreads, medians
 
 
 def _agree(
-    name: str | None, run: FilterRun, medians: Mapping[Segment, Floats], kept: _Kept
+    name: str | None, run: FilterRun, medians: Mapping[Segment, Floats], compared: _Kept
 ) -> FilterAgreement:
     """One row of the table: RMS over all segments relative to the median and to the analysis."""
     by_median, by_own = (
         {
             s: score
             for s, q in run.q.items()
-            if s in other and (score := score_between(q, other[s], kept.valid[s])) is not None
+            if s in targets and (score := score_between(q, targets[s], compared.valid[s])) is not None
         }
-        for other in (medians, kept.chain)
+        for targets in (medians, compared.chain)
     )
-    told = run.told
+    notices = run.told
     to_median = pool_scores(list(by_median.values()))
     if name is not None and to_median is not None and to_median.total > FAR:
         message = Message(
             "{total:.0f}° from the median: far from the others. Exclude it to see the spread of the rest.",
             total=np.degrees(to_median.total),
         )
-        told = (*told, Notice(FAR_CODE, message))
+        notices = (*notices, Notice(FAR_CODE, message))
     label = OWN_CHAIN if name is None else LABELS[name]
     to_own = None if name is None else pool_scores(list(by_own.values()))
-    return FilterAgreement(name, label, run.cost_us, to_median, to_own, by_median, told)
+    return FilterAgreement(name, label, run.cost_us, to_median, to_own, by_median, notices)
 
 
 def _tell(agreements: list[FilterAgreement]) -> tuple[Notice, ...]:
     """Notices on all filters, shown above the results."""
     missing = [a.label for a in agreements if a.to_median is None]
     far = [a.label for a in agreements if any(n.code == FAR_CODE for n in a.told)]
-    told = []
+    notices = []
     if missing:
-        told.append(
+        notices.append(
             Notice(
                 "filters_left_out",
                 Message("No result (see the table for reasons): {missing}.", missing=", ".join(missing)),
             )
         )
     if far:
-        told.append(
+        notices.append(
             Notice(
                 "filters_far",
                 Message("Far from the others but included in the spread: {far}.", far=", ".join(far)),
             )
         )
-    return tuple(told)
+    return tuple(notices)
 
 
 def _score(
@@ -245,19 +246,19 @@ def _score(
     zero_offset: Mapping[str, float],
 ) -> ReferenceScores:
     """RMS errors and Bland–Altman statistics of every filter, segment and joint angle in the reference."""
-    known = {s: np.isfinite(q[:, 0]) & valid[s] for s, q in placed.q.items()}
-    whole = {s: np.where(known[s][:, None], q, (1.0, 0.0, 0.0, 0.0)) for s, q in placed.q.items()}
-    joints = measure_reference_angles(whole, known, zero_offset) if whole else {}
+    is_known = {s: np.isfinite(q[:, 0]) & valid[s] for s, q in placed.q.items()}
+    whole = {s: np.where(is_known[s][:, None], q, (1.0, 0.0, 0.0, 0.0)) for s, q in placed.q.items()}
+    joints = measure_reference_angles(whole, is_known, zero_offset) if whole else {}
     scores, pairs = {}, []
     for name, q in every.items():
         common = [s for s in placed.q if s in q]
-        found = {s: score_between(q[s], whole[s], known[s]) for s in common}
-        scores[name] = {s: score for s, score in found.items() if score is not None}
+        by_segment = {s: score_between(q[s], whole[s], is_known[s]) for s in common}
+        scores[name] = {s: score for s, score in by_segment.items() if score is not None}
         for s in common:
             values = zip(
                 ("inclination", "heading"),
                 lean_and_course(q[s]),
-                lean_and_course(np.where(known[s][:, None], placed.q[s], np.nan)),
+                lean_and_course(np.where(is_known[s][:, None], placed.q[s], np.nan)),
                 strict=True,
             )
             pairs += [(name, f"{s}_{quantity}", mine, theirs) for quantity, mine, theirs in values]

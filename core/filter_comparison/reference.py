@@ -57,7 +57,7 @@ class PlacedReference:
 
 def place_reference(
     table: OrientationTable,
-    worn: Mapping[str, Segment | None],
+    devices: Mapping[str, Segment | None],
     median: Mapping[Segment, Floats],
     valid: Mapping[Segment, Bools],
     t_s: Floats,
@@ -66,14 +66,14 @@ def place_reference(
 
     Parameters
     ----------
-    worn : device → segment, for columns named by sensor. median : segment → (m, 4) segment to W, median of
+    devices : device → segment, for columns named by sensor. median : segment → (m, 4) segment to W, median of
         the filters. t_s : (m,) uniform.
 
     Raises
     ------
     FormatError `no_common_segment`, `too_long`, `no_overlap`, `other_movement`.
     """
-    named = name_segments(table, worn)
+    named = name_segments(table, devices)
     common = [s for s in SEGMENTS if s in named and s in median]
     _check_reference(table, common, median)
     step = float(t_s[1] - t_s[0])
@@ -88,13 +88,13 @@ def place_reference(
     lag_s, correlation = find_lag(pairs, step, float(t_s[0] - own_t[0]), table.source)
     q = {}
     for s in common:
-        seen = interpolate(t_s - lag_s, table.t_s, named[s])
-        known = np.flatnonzero(np.isfinite(seen[:, 0]) & valid[s])
-        if len(known) * step < LEAST_OVERLAP_S:
+        interpolated = interpolate(t_s - lag_s, table.t_s, named[s])
+        samples = np.flatnonzero(np.isfinite(interpolated[:, 0]) & valid[s])
+        if len(samples) * step < LEAST_OVERLAP_S:
             continue
-        known = known[:: -(-len(known) // FITTED)]
-        world, sensor = fit_frames(seen[known], median[s][known])
-        q[s] = multiply(multiply(conjugate(world), seen), conjugate(sensor))
+        samples = samples[:: -(-len(samples) // FITTED)]
+        world, sensor = fit_frames(interpolated[samples], median[s][samples])
+        q[s] = multiply(multiply(conjugate(world), interpolated), conjugate(sensor))
     return PlacedReference(q, lag_s, correlation, _tell_placing(lag_s, correlation))
 
 
@@ -152,31 +152,31 @@ def _tell_placing(lag_s: float, correlation: float) -> tuple[Notice, ...]:
     )
 
 
-def name_segments(table: OrientationTable, worn: Mapping[str, Segment | None]) -> dict[Segment, Floats]:
+def name_segments(table: OrientationTable, assignment: Mapping[str, Segment | None]) -> dict[Segment, Floats]:
     """Columns of the reference by segment, named by the segment or by its sensor."""
-    devices = {device.lower(): segment for device, segment in worn.items()}
-    found: dict[Segment, Floats] = {}
+    devices = {device.lower(): segment for device, segment in assignment.items()}
+    columns: dict[Segment, Floats] = {}
     for name, q in table.q.items():
         segment = devices.get(name.lower()) or segment_named(name)
         if segment is not None:
-            found.setdefault(segment, q)
-    return found
+            columns.setdefault(segment, q)
+    return columns
 
 
 def interpolate(t_new: Floats, t_s: Floats, q: Floats) -> Floats:
     """Orientations (k, 4) at other times; NaN outside the range, and in gaps longer than 0.1 s or two
     samples.
     """
-    known = np.isfinite(q[:, 0])
-    t, x = t_s[known], q[known]
+    is_known = np.isfinite(q[:, 0])
+    t, x = t_s[is_known], q[is_known]
     out = np.full((len(t_new), 4), np.nan)
     if len(t) < 2:
         return out
     flips = np.sign((x[1:] * x[:-1]).sum(axis=1))
     x = x * np.concatenate(([1.0], np.cumprod(np.where(flips == 0.0, 1.0, flips))))[:, None]
     longest = max(GAP_S, 2.1 * float(np.median(np.diff(t_s))))
-    before = np.clip(np.searchsorted(t, t_new, "right") - 1, 0, len(t) - 2)
-    inside = (t_new >= t[0]) & (t_new <= t[-1]) & (t[before + 1] - t[before] <= longest)
+    previous = np.clip(np.searchsorted(t, t_new, "right") - 1, 0, len(t) - 2)
+    inside = (t_new >= t[0]) & (t_new <= t[-1]) & (t[previous + 1] - t[previous] <= longest)
     out[inside] = normalise(np.stack([np.interp(t_new[inside], t, x[:, c]) for c in range(4)], axis=1))
     return out
 
@@ -195,21 +195,21 @@ def find_lag(
     ------
     FormatError `no_overlap`, `other_movement`.
     """
-    above, left, right, both = (np.zeros(1) for _ in range(4))
+    covariance, left, right, overlap = (np.zeros(1) for _ in range(4))
     for take, reference in pairs:
-        (a, here), (b, there) = (_known(x) for x in (take, reference))
-        n = np.maximum(_meet(here, there), 1.0)
-        mean_a, mean_b = _meet(a, there) / n, _meet(here, b) / n
-        above = above + _meet(a, b) - n * mean_a * mean_b
-        left = left + _meet(a**2, there) - n * mean_a**2
-        right = right + _meet(here, b**2) - n * mean_b**2
-        both = np.maximum(both, n)
+        (a, take_known), (b, reference_known) = (_known(x) for x in (take, reference))
+        n = np.maximum(_meet(take_known, reference_known), 1.0)
+        mean_a, mean_b = _meet(a, reference_known) / n, _meet(take_known, b) / n
+        covariance = covariance + _meet(a, b) - n * mean_a * mean_b
+        left = left + _meet(a**2, reference_known) - n * mean_a**2
+        right = right + _meet(take_known, b**2) - n * mean_b**2
+        overlap = np.maximum(overlap, n)
     shorter = min(len(x) for x in pairs[0])
-    enough = both >= max(LEAST_OVERLAP_S / step_s, LEAST_SHARE * shorter)
+    enough = overlap >= max(LEAST_OVERLAP_S / step_s, LEAST_SHARE * shorter)
     if not enough.any():
         raise _too_short(source)
     power = np.sqrt(np.maximum(left, 0.0) * np.maximum(right, 0.0))
-    r = np.where(enough & (power > 1e-12 * power.max()), above / np.where(power > 0.0, power, 1.0), -1.0)
+    r = np.where(enough & (power > 1e-12 * power.max()), covariance / np.where(power > 0.0, power, 1.0), -1.0)
     # sample k of the take meets sample k − shift of the reference
     lags = (np.arange(len(r)) - (len(pairs[0][1]) - 1)) * step_s + ahead_s
     best = int(np.argmax(r))
@@ -263,7 +263,7 @@ def fit_frames(reference: Floats, q: Floats) -> tuple[Floats, Floats]:
 
 
 def measure_reference_angles(
-    q: Mapping[Segment, Floats], known: Mapping[Segment, Bools], zero_offset: Mapping[str, float]
+    q: Mapping[Segment, Floats], is_known: Mapping[Segment, Bools], zero_offset: Mapping[str, float]
 ) -> dict[str, Floats]:
     """Joint angles (m,) of an aligned reference with the zero of the recording, so it need not include
     standing.
@@ -274,7 +274,7 @@ def measure_reference_angles(
     """
     kernel = AngleKernel.between(tuple(q))
     zero = np.array([zero_offset.get(name, np.nan) for name in kernel.names])
-    angles = kernel.measure(np.stack([*q.values()], axis=1), np.stack([known[s] for s in q], axis=1), zero)
+    angles = kernel.measure(np.stack([*q.values()], axis=1), np.stack([is_known[s] for s in q], axis=1), zero)
     return {name: angles[:, i] for i, name in enumerate(kernel.names) if name in zero_offset}
 
 
@@ -282,16 +282,16 @@ def compare_by_bland_altman(
     name: str | None, quantity: str, value: Floats, reference: Floats
 ) -> BlandAltman | None:
     """Bland–Altman statistics of angles (m,) in rad where both are known; None with fewer than two."""
-    known = np.isfinite(value) & np.isfinite(reference)
-    if np.count_nonzero(known) < 2:
+    is_known = np.isfinite(value) & np.isfinite(reference)
+    if np.count_nonzero(is_known) < 2:
         return None
-    apart = wrap_angle(value[known] - reference[known])
+    apart = wrap_angle(value[is_known] - reference[is_known])
     bias, sd = float(apart.mean()), float(apart.std(ddof=1))
-    shown = np.linspace(0, len(apart) - 1, min(POINTS, len(apart))).round().astype(np.int64)
+    points = np.linspace(0, len(apart) - 1, min(POINTS, len(apart))).round().astype(np.int64)
     return BlandAltman(
         name, quantity, len(apart), bias, bias - 1.96 * sd, bias + 1.96 * sd,
         float(np.sqrt((apart**2).mean())),
-        wrap_angle(reference[known][shown] + 0.5 * apart[shown]), apart[shown],
+        wrap_angle(reference[is_known][points] + 0.5 * apart[points]), apart[points],
     )  # fmt: skip
 
 
@@ -308,8 +308,8 @@ def _speed(q: Floats) -> Floats:
 
 def _known(x: Floats) -> tuple[Floats, Floats]:
     """The signal with unknown samples set to zero, and its validity as 0 or 1."""
-    known = np.isfinite(x)
-    return np.where(known, x, 0.0), known.astype(np.float64)
+    is_known = np.isfinite(x)
+    return np.where(is_known, x, 0.0), is_known.astype(np.float64)
 
 
 def _meet(a: Floats, b: Floats) -> Floats:

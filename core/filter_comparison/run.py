@@ -69,22 +69,22 @@ class FilterRun:
 
 
 def prepare_signals(
-    calibrated: CalibratedRecording, alone: Orientations, *, magnetometer: bool
+    calibrated: CalibratedRecording, single: Orientations, *, magnetometer: bool
 ) -> dict[Segment, MountedSignals]:
     """Signals and initial state of every calibrated sensor.
 
     Parameters
     ----------
-    alone : orientations of each sensor independently, with the same alignment.
+    single : orientations of each sensor independently, with the same alignment.
     """
     recording, zero = calibrated.recording, calibrated.calibration.zero
     window = index_window(zero, recording.rate_hz)
-    at = min((window.start + window.stop) // 2, len(recording.t_s) - 1)
-    found = {}
+    middle = min((window.start + window.stop) // 2, len(recording.t_s) - 1)
+    prepared = {}
     for segment, mounted in calibrated.calibration.segments.items():
         signals = recording.sensors[segment]
         sensor = from_matrix(mounted.R_segment_sensor)
-        q = multiply(alone.q[segment], sensor)
+        q = multiply(single.q[segment], sensor)
         lost = ~signals.valid[:, None]
         acc, gyr = (np.where(lost, np.nan, x)[:, None] for x in (signals.acc, signals.gyr))
         gyr[1:] = 0.5 * (gyr[1:] + gyr[:-1])
@@ -94,13 +94,13 @@ def prepare_signals(
             field = rotate(q[window], mag[window, 0])
             field = field[np.isfinite(field).all(axis=1)]
             # seen from the sensor in the middle: a walk that serves as zero turns it meanwhile
-            north = rotate(conjugate(q[at]), field.mean(axis=0))[None] if len(field) else None
-        up = rotate(conjugate(q[at]), np.array([0.0, 0.0, mounted.rest_norm]))
-        rest = RestMeans(up[None], mounted.gyro_bias[None], north)
-        found[segment] = MountedSignals(
-            gyr, acc, None if north is None else mag, rest, at, q[at], conjugate(sensor)
+            north = rotate(conjugate(q[middle]), field.mean(axis=0))[None] if len(field) else None
+        up = rotate(conjugate(q[middle]), np.array([0.0, 0.0, mounted.rest_norm]))
+        means = RestMeans(up[None], mounted.gyro_bias[None], north)
+        prepared[segment] = MountedSignals(
+            gyr, acc, None if north is None else mag, means, middle, q[middle], conjugate(sensor)
         )
-    return found
+    return prepared
 
 
 def run_filter(
@@ -117,7 +117,7 @@ def run_filter(
     keep : samples of the result.
     """
     q: dict[Segment, Floats] = {}
-    told, spent_s, samples = [], 0.0, 0
+    notices, spent_s, samples = [], 0.0, 0
     orient = _orient_by_own if name in BOTH_WAYS else _orient_by_published
     for segment, x in signals.items():
         try:
@@ -127,18 +127,18 @@ def run_filter(
             sensor = orient(name, x, rate_hz)
             spent_s += clock() - began
         except SagittalError as error:
-            told.append(Notice(error.code, error.message, segment))
+            notices.append(Notice(error.code, error.message, segment))
             continue
         samples += len(x.gyr)
         _, turn = split_heading(multiply(x.start, conjugate(sensor[x.at])))
         q[segment] = multiply(multiply(about(2, turn), sensor[keep]), x.sensor_q)
-    return FilterRun(q, 1e6 * spent_s / samples if samples else None, _join(told, len(signals)))
+    return FilterRun(q, 1e6 * spent_s / samples if samples else None, _join(notices, len(signals)))
 
 
 def _orient_by_published(name: str, x: MountedSignals, rate_hz: float) -> Floats:
     """Sensor to the filter's world frame (n, 4), from the middle of the rest to both ends."""
     out = np.empty((len(x.gyr), 4))
-    later, before = slice(x.at + 1, None), slice(x.at - 1, None, -1)
+    later, earlier = slice(x.at + 1, None), slice(x.at - 1, None, -1)
     run = FusionFilter(name, rate_hz, x.rest)
     out[x.at] = run.q[0]
     if x.at + 1 < len(out):
@@ -147,7 +147,7 @@ def _orient_by_published(name: str, x: MountedSignals, rate_hz: float) -> Floats
         # from a sample to the one before by the rate that led from that to this
         back = FusionFilter(name, rate_hz, RestMeans(x.rest.acc, -x.rest.gyr, x.rest.mag))
         rate = -x.gyr[1 : x.at + 1][::-1]
-        out[before] = back.advance(rate, x.acc[before], _part(x.mag, before))[:, 0]
+        out[earlier] = back.advance(rate, x.acc[earlier], _part(x.mag, earlier))[:, 0]
     return out
 
 
@@ -167,8 +167,8 @@ def _part(mag: Floats | None, part: slice) -> Floats | None:
     return None if mag is None else mag[part]
 
 
-def _join(told: list[Notice], sensors: int) -> tuple[Notice, ...]:
+def _join(notices: list[Notice], sensors: int) -> tuple[Notice, ...]:
     """One notice for all segments with the same failure."""
-    if len(told) == sensors and len({(n.code, n.message) for n in told}) == 1:
-        return (Notice(told[0].code, told[0].message),)
-    return tuple(told)
+    if len(notices) == sensors and len({(n.code, n.message) for n in notices}) == 1:
+        return (Notice(notices[0].code, notices[0].message),)
+    return tuple(notices)

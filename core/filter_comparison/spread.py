@@ -22,9 +22,9 @@ def find_median(q: Floats, near: Floats) -> Floats:
     return multiply(exp(np.median(apart, axis=0)), near)
 
 
-def score_between(q: Floats, other: Floats, valid: Bools) -> OrientationScore | None:
+def score_between(q: Floats, second: Floats, valid: Bools) -> OrientationScore | None:
     """RMS of the angle between two orientations (m, 4) where valid (m,); None without valid samples."""
-    return score_error(multiply(other[valid], conjugate(q[valid]))) if valid.any() else None
+    return score_error(multiply(second[valid], conjugate(q[valid]))) if valid.any() else None
 
 
 def pool_scores(scores: Sequence[OrientationScore]) -> OrientationScore | None:
@@ -45,29 +45,29 @@ def spread_of_segment(
     median = find_median(q, near)
     tilt, turn = split_heading(multiply(q, conjugate(median)))
     lost = ~valid
-    found = {
+    spreads = {
         f"{segment}_inclination": (
             np.linalg.norm(tilt.std(axis=0), axis=-1),
             np.linalg.norm(np.ptp(tilt, axis=0), axis=-1),
         ),
         f"{segment}_heading": (turn.std(axis=0), np.ptp(turn, axis=0)),
     }
-    for sd, reach in found.values():
+    for sd, reach in spreads.values():
         sd[lost] = reach[lost] = np.nan
-    return found, median
+    return spreads, median
 
 
 def spread_of_angles(
     angles: Sequence[Mapping[str, Floats]], near: Mapping[str, Floats]
 ) -> dict[str, tuple[Floats, Floats, int]]:
     """Spread of joint angles between filters by name: SD, range (m,) in rad, and number of filters."""
-    found = {}
+    spreads = {}
     for name, own in near.items():
         rows = [wrap_angle(x[name] - own) for x in angles if name in x]
         if rows:
             apart = np.stack(rows)
-            found[name] = (apart.std(axis=0), np.ptp(apart, axis=0), len(rows))
-    return found
+            spreads[name] = (apart.std(axis=0), np.ptp(apart, axis=0), len(rows))
+    return spreads
 
 
 def cut_into_cycles(
@@ -80,14 +80,14 @@ def cut_into_cycles(
     stance: dict[Side, float | None] = {}
     swing: dict[Side, float | None] = {}
     for side in own or SIDES:
-        counted = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
-        if not counted:
+        valid_strides = [s for s in strides.strides if s.side == side and s.excluded_reason is None]
+        if not valid_strides:
             continue
-        whole = _square(sd, t_s, [(s.start_s, s.end_s) for s in counted])
+        whole = _square(sd, t_s, [(s.start_s, s.end_s) for s in valid_strides])
         if whole is None:
             continue
         cycle[side] = np.sqrt(whole)
-        stance[side], swing[side] = (_phase(sd, t_s, counted, phase) for phase in ("stance", "swing"))
+        stance[side], swing[side] = (_phase(sd, t_s, valid_strides, phase) for phase in ("stance", "swing"))
     return FilterSpread(name, filters, sd, reach, cycle, stance, swing)
 
 

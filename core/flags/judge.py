@@ -112,7 +112,7 @@ def judge_flags(
     -------
     One flag per rule and side in the order of `RULES`; one per rule for ratios.
     """
-    found = _values(curves, parameters, standing_deg or {})
+    values = _values(curves, parameters, standing_deg or {})
     speed = next((p.mean for p in parameters if p.name == "gait_speed_mps"), None)
     adults = look_up_norms(None, None, speed, height_m)
     child = wbds_group(age) is None
@@ -120,11 +120,11 @@ def judge_flags(
     for rule in RULES:
         limited = _with_limit(_at_speed(rule, adults), controls)
         if rule.kind == "ratio":
-            result.append(_ratio(limited, found))
+            result.append(_ratio(limited, values))
             continue
         for side in SIDES:
-            flag = _difference(limited, side, found) if rule.kind == "difference" else None
-            flag = flag or _level(limited, side, found)
+            flag = _difference(limited, side, values) if rule.kind == "difference" else None
+            flag = flag or _level(limited, side, values)
             if limited.adults == "limit" and (child or adults.reason is not None):
                 missing = "no_norm_for_age" if child else adults.reason
                 reason = missing if flag.value is not None else flag.reason
@@ -144,10 +144,14 @@ def _values(
     for side in SIDES:
         swing, stance = plain.get(("swing_time_s", side)), plain.get(("stance_time_s", side))
         if swing is not None and stance is not None and swing.mean is not None and stance.mean:
-            of = swing.mean / stance.mean
+            ratio = swing.mean / stance.mean
             # at most: the two of a stride may vary against each other
-            sd = None if swing.sd is None or stance.sd is None else (swing.sd + of * stance.sd) / stance.mean
-            plain[SWING_TO_STANCE, side] = _Value(of, min(swing.n, stance.n), sd=sd)
+            sd = (
+                None
+                if swing.sd is None or stance.sd is None
+                else (swing.sd + ratio * stance.sd) / stance.mean
+            )
+            plain[SWING_TO_STANCE, side] = _Value(ratio, min(swing.n, stance.n), sd=sd)
     if curves is None:
         return _Values(plain)
     return _Values(plain, _figures(curves), _figures(anatomical_curves(curves, standing_deg)))
@@ -159,29 +163,29 @@ _JUDGED: Final = {rule.measure: CURVES[rule.measure] for rule in RULES if rule.m
 
 def _figures(curves: CycleCurves) -> dict[tuple[str, Side], _Value]:
     """Means over the counted strides of the curve parameters used by the rules."""
-    found: dict[tuple[str, Side], _Value] = {}
+    figures: dict[tuple[str, Side], _Value] = {}
     for name, sides in stride_figures(curves, _JUDGED).items():
         level = CURVES[name].statistic != "range"
         for side, values in sides.items():
             if level and curves.zero == "walking":
-                found[name, side] = _Value(None, 0, NO_STANDING)
+                figures[name, side] = _Value(None, 0, NO_STANDING)
                 continue
-            counted = values[curves.used[side]]
-            whole = counted[np.isfinite(counted)]
+            selected = values[curves.used[side]]
+            whole = selected[np.isfinite(selected)]
             if len(whole):
                 mean, sd = mean_and_sd(whole)
-                found[name, side] = _Value(mean, len(whole), sd=sd, own=_own(CURVES[name]))
+                figures[name, side] = _Value(mean, len(whole), sd=sd, own=_own(CURVES[name]))
             else:
-                found[name, side] = _Value(None, 0, "gap" if len(counted) else "no_strides")
-    return found
+                figures[name, side] = _Value(None, 0, "gap" if len(selected) else "no_strides")
+    return figures
 
 
 def _own(figure: CurveFigure) -> float:
     """Systematic error of one side of a curve parameter, degrees; 0 if never determined."""
-    known = LEVELS.get(figure.variable)
-    if known is None:
+    errors = LEVELS.get(figure.variable)
+    if errors is None:
         return 0.0
-    return known.own * (sqrt(2.0) if figure.statistic == "range" else 1.0)
+    return errors.own * (sqrt(2.0) if figure.statistic == "range" else 1.0)
 
 
 def _at_speed(rule: Rule, adults: Norms) -> Rule:
@@ -214,28 +218,28 @@ def _with_limit(rule: Rule, controls: Norms | None) -> Rule:
     return replace(rule, limit=norm.mean + sign * 2.0 * norm.sd, source=f"{rule.source}: {norm.source}")
 
 
-def _level(rule: Rule, side: Side, found: _Values) -> Flag:
+def _level(rule: Rule, side: Side, values: _Values) -> Flag:
     """Flag on the value of one side."""
     key = rule.measure, side
     if rule.measure not in CURVES:
-        return _flag(rule, side, found.plain.get(key) or _Value(None, 0, "no_strides"), None)
-    if key in found.anatomical:
-        return _flag(rule, side, found.anatomical[key], "anatomical")
-    value = found.standing.get(key) or _Value(None, 0, "joint_missing")
+        return _flag(rule, side, values.plain.get(key) or _Value(None, 0, "no_strides"), None)
+    if key in values.anatomical:
+        return _flag(rule, side, values.anatomical[key], "anatomical")
+    value = values.standing.get(key) or _Value(None, 0, "joint_missing")
     flag = _flag(rule, side, value, "standing")
     if rule.level and value.mean is not None:
         return replace(flag, exceeded=None, marked=False, reason="angle_zero_standing")
     return flag
 
 
-def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
+def _difference(rule: Rule, side: Side, values: _Values) -> Flag:
     """Flag on the other side minus this side, both relative to the same zero."""
-    own, other = (rule.measure, side), (rule.measure, OTHER[side])
+    own, opposite = (rule.measure, side), (rule.measure, OTHER[side])
     free = CURVES[rule.measure].statistic == "range"
-    both = own in found.anatomical and other in found.anatomical
-    table = found.anatomical if both and not free else found.standing
-    zero: Zero | None = None if free else "anatomical" if both else "standing"
-    a, b = table.get(own), table.get(other)
+    both_anatomical = own in values.anatomical and opposite in values.anatomical
+    table = values.anatomical if both_anatomical and not free else values.standing
+    zero: Zero | None = None if free else "anatomical" if both_anatomical else "standing"
+    a, b = table.get(own), table.get(opposite)
     if a is None or b is None:
         return _flag(rule, side, _Value(None, 0, "joint_missing" if a is None else "side_missing"), zero)
     if a.mean is None or b.mean is None:
@@ -244,12 +248,12 @@ def _difference(rule: Rule, side: Side, found: _Values) -> Flag:
     return replace(flag, note="sides_stand_differently") if zero == "standing" else flag
 
 
-def _ratio(rule: Rule, found: _Values) -> Flag:
+def _ratio(rule: Rule, values: _Values) -> Flag:
     """Flag on the larger side over the smaller side; it is assigned to the larger."""
-    left, right = (found.plain.get((rule.measure, s)) or _Value(None, 0, "no_strides") for s in SIDES)
+    left, right = (values.plain.get((rule.measure, s)) or _Value(None, 0, "no_strides") for s in SIDES)
     if left.mean is None or right.mean is None:
-        why = left.reason if left.mean is None else right.reason
-        return _flag(rule, None, _Value(None, 0, why or "side_missing"), None)
+        missing_reason = left.reason if left.mean is None else right.reason
+        return _flag(rule, None, _Value(None, 0, missing_reason or "side_missing"), None)
     small, large = sorted((left.mean, right.mean))
     if small <= SMALLEST:
         return _flag(rule, None, _Value(None, 0, "near_zero"), None)

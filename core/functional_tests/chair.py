@@ -54,10 +54,10 @@ def measure_chair_rises(
     if len(rises) < RISES:
         segments = _segments(rises, changes)
         end = limits.end_s
-        known = start is not None and end is not None and rises
+        is_complete = start is not None and end is not None and rises
         reason = "too_few_rises" if rises else "no_rise"
-        counted = {"chair_rise_count": float(len(rises))} if known else {}
-        rows = state_figures(counted, NAMES, reason)
+        count = {"chair_rise_count": float(len(rises))} if is_complete else {}
+        rows = state_figures(count, NAMES, reason)
         return FunctionalTest(start, end, segments, rows, trunk.segment, corrected)
     rises = rises[:RISES]
     segments = _segments(rises, changes)
@@ -77,7 +77,7 @@ def measure_chair_rises(
     sitting = [s.duration_s for s in segments if s.name == STAND_TO_SIT]
     values["chair_sit_down_s"] = float(np.mean(sitting)) if sitting else None
     more = len(_row([c for c in changes if c.kind == SIT_TO_STAND])) - RISES
-    told = (
+    notices = (
         (
             Notice(
                 "more_rises",
@@ -93,7 +93,7 @@ def measure_chair_rises(
         else ()
     )
     rows = state_figures(values, NAMES, "no_sit_down")
-    return FunctionalTest(begin, end, segments, rows, trunk.segment, corrected, told)
+    return FunctionalTest(begin, end, segments, rows, trunk.segment, corrected, notices)
 
 
 def _row(rises: list[PostureChange]) -> list[PostureChange]:

@@ -92,8 +92,8 @@ class GuidedTest:
     ) -> None:
         self.protocol = protocol
         self.params = params or LiveTestParams()
-        wanted = tuple(FOOT.values()) if protocol in WALK_TESTS else TRUNK
-        watched = tuple(s for s in wanted if s in columns)
+        candidates = tuple(FOOT.values()) if protocol in WALK_TESTS else TRUNK
+        watched = tuple(s for s in candidates if s in columns)
         self._watched = watched if protocol in WALK_TESTS else watched[:1]
         self._columns = np.array([columns.index(s) for s in self._watched], np.int64)
         self._rate = rate_hz
@@ -172,56 +172,56 @@ class GuidedTest:
                 self._look(at)
         self.view = self._show(problem, final=final)
 
-    def _wait(self, at: int, problem: str | None) -> str | None:
+    def _wait(self, sample: int, problem: str | None) -> str | None:
         """Check for rest, and for the start of the test."""
         p, rate = self.params, self._rate
-        low = max(self._from, at - round(p.kept_s * rate))
+        low = max(self._from, sample - round(p.kept_s * rate))
         self._kept.drop_before(low)
         if self.protocol in STANDING_TESTS:
-            if self._asked and self._stands(at):
-                self._start(at)
+            if self._asked and self._stands(sample):
+                self._start(sample)
                 return None
             return problem
         needed = p.standing_s if self.protocol in WALK_TESTS else p.quiet_s
-        quiet = self._quiet_s(self._from, at, needed)
+        quiet = self._quiet_s(self._from, sample, needed)
         if self._phase == "ready" and quiet == 0.0:
-            self._start(at - self._tick)
+            self._start(sample - self._tick)
             return None
         if quiet >= needed:
             self._phase = "ready"
         return problem
 
-    def _start(self, at: int) -> None:
-        self._phase, self._moved, self._looked = "running", at, None
+    def _start(self, sample: int) -> None:
+        self._phase, self._moved, self._looked = "running", sample, None
 
-    def _run(self, at: int) -> str | None:
+    def _run(self, sample: int) -> str | None:
         """Check for the end of the test."""
         p, rate = self.params, self._rate
         if self.protocol in STANDING_TESTS:
-            return self._stand(at)
+            return self._stand(sample)
         seconds = self._seconds()
         longest = p.longest_s if seconds is None else seconds + p.longest_s
-        if at - self._moved > longest * rate:
-            self._begin_anew(at, "trial_too_long")
+        if sample - self._moved > longest * rate:
+            self._begin_anew(sample, "trial_too_long")
             return "trial_too_long"
         if self.protocol in WALK_TESTS:  # its strides tell; the samples only say who is quiet
-            self._kept.drop_before(at - round((LONGEST_S + REST.window_s) * rate))
-        if not self._is_look(at) or self._is_early(at):
+            self._kept.drop_before(sample - round((LONGEST_S + REST.window_s) * rate))
+        if not self._is_look(sample) or self._is_early(sample):
             return None
-        self._look(at)
+        self._look(sample)
         test = self._looked
-        quiet = self._quiet_s(self._moved, at, LONGEST_S)
+        quiet = self._quiet_s(self._moved, sample, LONGEST_S)
         if test is None or test.start_s is None:
             if quiet >= p.still_s:
                 self._begin_anew(self._moved, None)
             return None
-        if self._is_over(test, at, quiet):
+        if self._is_over(test, sample, quiet):
             self._phase = "done"
         return None
 
-    def _is_over(self, test: FunctionalTest, at: int, quiet: float) -> bool:
+    def _is_over(self, test: FunctionalTest, sample: int, quiet: float) -> bool:
         """Whether the test has ended, by its definition or after a long rest."""
-        p, now = self.params, at / self._rate
+        p, now = self.params, sample / self._rate
         if self.protocol == "walk_10m":
             return quiet >= p.still_s
         if self.protocol == "walk_6min":
@@ -235,49 +235,49 @@ class GuidedTest:
         settled = test.end_s is not None and now >= test.end_s + p.settle_s
         return (whole and settled) or (bool(_rises(test)) and quiet >= LONGEST_S)
 
-    def _is_early(self, at: int) -> bool:
+    def _is_early(self, sample: int) -> bool:
         """Whether a timed walk is still running, with nothing to measure yet."""
         seconds, test = self._seconds(), self._looked
         if seconds is None or test is None or test.start_s is None:
             return False
-        return at / self._rate < test.start_s + seconds + self.params.settle_s
+        return sample / self._rate < test.start_s + seconds + self.params.settle_s
 
-    def _stand(self, at: int) -> str | None:
+    def _stand(self, sample: int) -> str | None:
         """Quiet standing: completed, or interrupted."""
         p, rate = self.params, self._rate
-        if not self._stands(at):
-            self._begin_anew(at, "stepped")
+        if not self._stands(sample):
+            self._begin_anew(sample, "stepped")
             return "stepped"
-        if at < self._moved + (p.stand_s + p.settle_s) * rate:
+        if sample < self._moved + (p.stand_s + p.settle_s) * rate:
             return None
-        self._look(at)
+        self._look(sample)
         if self._looked is None or self._looked.end_s is None:
-            self._begin_anew(at, "stepped")
+            self._begin_anew(sample, "stepped")
             return "stepped"
         self._phase = "done"
         return None
 
-    def _stands(self, at: int) -> bool:
+    def _stands(self, sample: int) -> bool:
         """Whether the person has been in quiet standing over the last seconds."""
-        low = max(self._from, at - round((self.params.quiet_s + 1.0) * self._rate))
-        take = self._recording(low, at)
+        low = max(self._from, sample - round((self.params.quiet_s + 1.0) * self._rate))
+        take = self._recording(low, sample)
         windows = find_rest_windows(take, STANDING_QUIETLY, self._watched)
-        end = (at - low) / self._rate
+        end = (sample - low) / self._rate
         return any(b > end - 0.5 and b - a >= self.params.quiet_s for a, b in windows)
 
-    def _begin_anew(self, at: int, problem: str | None) -> None:
+    def _begin_anew(self, sample: int, problem: str | None) -> None:
         """Return to the waiting phase, with the samples from this one on."""
-        asked = self._asked and self.protocol in STANDING_TESTS
-        self._phase, self._looked, self._limits = "ready" if asked else "get_ready", None, GivenLimits()
-        if problem is not None or at >= self._kept.end:
-            self._from = at
-            self._kept.drop_before(at)
+        requested = self._asked and self.protocol in STANDING_TESTS
+        self._phase, self._looked, self._limits = "ready" if requested else "get_ready", None, GivenLimits()
+        if problem is not None or sample >= self._kept.end:
+            self._from = sample
+            self._kept.drop_before(sample)
         self.view = self._show(problem)
 
-    def _look(self, at: int) -> None:
+    def _look(self, sample: int) -> None:
         """Measure the samples so far, as for a file."""
         try:
-            self._looked = self._measure(at)
+            self._looked = self._measure(sample)
         except EstimationError:
             self._looked = None
 
@@ -293,25 +293,25 @@ class GuidedTest:
             begin = self._moved / self._rate
             start = begin if limits.start_s is None else limits.start_s
             end = begin + self.params.stand_s if limits.end_s is None else limits.end_s
-            found = measure_sway(take, GivenLimits(max(0.0, start - zero), end - zero), p.sway)
-            found = replace(found, corrected=limits != GivenLimits())
-            return shift_test(found, zero)
-        given = GivenLimits(
+            sway_test = measure_sway(take, GivenLimits(max(0.0, start - zero), end - zero), p.sway)
+            sway_test = replace(sway_test, corrected=limits != GivenLimits())
+            return shift_test(sway_test, zero)
+        limits_so_far = GivenLimits(
             *(None if t is None else max(0.0, t - zero) for t in (limits.start_s, limits.end_s))
         )
         trunk = follow_trunk(take)
         if self.protocol == "tug":
-            return shift_test(measure_tug(trunk, given, p.rising, self.params.turning), zero)
-        return shift_test(measure_chair_rises(trunk, given, p.rising), zero)
+            return shift_test(measure_tug(trunk, limits_so_far, p.rising, self.params.turning), zero)
+        return shift_test(measure_chair_rises(trunk, limits_so_far, p.rising), zero)
 
-    def _gait(self, at: int) -> MeasuredGait:
+    def _gait(self, sample: int) -> MeasuredGait:
         """Gait of the walk so far from the live strides."""
-        now, since = at / self._rate, self._moved / self._rate - 1.0
-        told: dict[int, LiveStride] = {}
+        now, since = sample / self._rate, self._moved / self._rate - 1.0
+        latest: dict[int, LiveStride] = {}
         for s in self._strides:
             if s.detected_s <= now and s.start_s >= since:
-                told[s.n] = s
-        rows = sorted(told.values(), key=lambda s: s.end_s)
+                latest[s.n] = s
+        rows = sorted(latest.values(), key=lambda s: s.end_s)
         events: dict[tuple[str, str, float], GaitEvent] = {}
         for e in self._events:
             if since <= e.time_s <= now:
@@ -325,25 +325,25 @@ class GuidedTest:
         columns: Mapping[str, Any] = {LENGTH: tuple(s.values.get(LENGTH) for s in rows)}
         return MeasuredGait(steps, Strides(strides), (), columns, find_bouts(steps), turns)
 
-    def _recording(self, low: int, at: int) -> UniformRecording:
+    def _recording(self, low: int, sample: int) -> UniformRecording:
         """Samples of the axis as a separate recording."""
-        sensors = self._kept.cut(low, at, self._watched)
-        t_s = np.arange(at - low) / self._rate
+        sensors = self._kept.cut(low, sample, self._watched)
+        t_s = np.arange(sample - low) / self._rate
         return UniformRecording(t_s, self._rate, sensors, self._subject, self.protocol, {})
 
-    def _quiet_s(self, low: int, at: int, most_s: float) -> float:
+    def _quiet_s(self, low: int, sample: int, most_s: float) -> float:
         """How long all monitored sensors have been quiet (core/signals/rest.py), s; limited to the search
         window.
         """
-        low = max(low, at - round((most_s + REST.window_s) * self._rate), self._kept.first)
-        quiet = np.ones(at - low, np.bool_)
-        for sensor in self._kept.cut(low, at, self._watched).values():
+        low = max(low, sample - round((most_s + REST.window_s) * self._rate), self._kept.first)
+        quiet = np.ones(sample - low, np.bool_)
+        for sensor in self._kept.cut(low, sample, self._watched).values():
             quiet &= measure_quietness(sensor, self._rate, REST).quiet
         moving = np.flatnonzero(~quiet)
         return (len(quiet) if not len(moving) else len(quiet) - 1 - int(moving[-1])) / self._rate
 
-    def _is_look(self, at: int) -> bool:
-        return (at // self._tick) % self._ticks_a_look == 0
+    def _is_look(self, sample: int) -> bool:
+        return (sample // self._tick) % self._ticks_a_look == 0
 
     def _seconds(self) -> float | None:
         if self.protocol in STANDING_TESTS:
@@ -356,8 +356,8 @@ class GuidedTest:
     def _show(self, problem: str | None = None, *, final: bool = False) -> GuidedTestView:
         test = self._looked
         going = self._phase in ("running", "done")
-        found = test.start_s if test is not None else None
-        start = found if found is not None else self._moved / self._rate
+        start_found_s = test.start_s if test is not None else None
+        start = start_found_s if start_found_s is not None else self._moved / self._rate
         return GuidedTestView(
             self.protocol,
             self._phase,

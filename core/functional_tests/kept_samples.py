@@ -34,23 +34,25 @@ class KeptSamples:
         self._size += n
         self.end = block.first + n
 
-    def drop_before(self, at: int) -> None:
+    def drop_before(self, sample: int) -> None:
         """Discard all samples before one of the axis."""
-        self.first = max(self.first, min(at, self.end))
+        self.first = max(self.first, min(sample, self.end))
 
-    def cut(self, low: int, at: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
+    def cut(self, low: int, end: int, segments: Sequence[Segment]) -> dict[Segment, SensorSignals]:
         """Copies of the sensor signals in a range."""
-        k = self._span(low, at)
+        k = self._span(low, end)
         signals, flags = self._signals[k], self._flags[k]
-        found: dict[Segment, SensorSignals] = {}
+        signals_by_segment: dict[Segment, SensorSignals] = {}
         for i, s in enumerate(segments):
             acc, gyr = np.ascontiguousarray(signals[:, i, :3]), np.ascontiguousarray(signals[:, i, 3:])
-            found[s] = SensorSignals(s, acc, gyr, None, flags[:, i, 0].copy(), flags[:, i, 1].copy())
-        return found
+            signals_by_segment[s] = SensorSignals(
+                s, acc, gyr, None, flags[:, i, 0].copy(), flags[:, i, 1].copy()
+            )
+        return signals_by_segment
 
-    def _span(self, low: int, at: int) -> slice:
+    def _span(self, low: int, until: int) -> slice:
         zero = self.end - self._size
-        return slice(max(0, max(low, self.first) - zero), max(0, at - zero))
+        return slice(max(0, max(low, self.first) - zero), max(0, until - zero))
 
     def _grow(self, n: int) -> None:
         """Make room: reclaim discarded samples, then double the capacity until it suffices."""

@@ -63,7 +63,7 @@ def _state(name: str, value: float | None, reason: str | None) -> Parameter:
     if value is None:
         return Parameter(name, None, 0, None, None, unit_of(name), reason or "test_not_found")
     errors = CATALOGUE[name].errors
-    known = None if errors is None else NORMAL_95 * hypot(errors.common, errors.own, errors.random)
+    half_width = None if errors is None else NORMAL_95 * hypot(errors.common, errors.own, errors.random)
     return Parameter(
         name,
         None,
@@ -71,7 +71,7 @@ def _state(name: str, value: float | None, reason: str | None) -> Parameter:
         value,
         None,
         unit_of(name),
-        uncertainty=known,
+        uncertainty=half_width,
         u_own=None if errors is None else hypot(errors.own, errors.random),
         u_common=None if errors is None else errors.common,
     )

@@ -84,28 +84,34 @@ def find_changes(trunk: TrunkMotion, params: RisingParams | None = None) -> tupl
     if len(trunk.t_s) < rate * 3.0:
         return ()
     speed = _vertical_speed(trunk, params)
-    found = []
+    extremes = []
     for sign in (1.0, -1.0):
         for first, end in find_runs(sign * speed > 0.3 * params.speed_mps):
-            at = first + int(np.argmax(sign * speed[first:end]))
-            if sign * speed[at] >= params.speed_mps and trunk.valid[first:end].all():
-                found.append((at, sign))
-    found.sort()
-    rows = ((at, sign, _cut_out(found, i, speed, rate, params)) for i, (at, sign) in enumerate(found))
-    changes = (_measure(trunk, at, sign, part, params) for at, sign, part in rows)
+            fastest = first + int(np.argmax(sign * speed[first:end]))
+            if sign * speed[fastest] >= params.speed_mps and trunk.valid[first:end].all():
+                extremes.append((fastest, sign))
+    extremes.sort()
+    rows = (
+        (fastest, sign, _cut_out(extremes, i, speed, rate, params))
+        for i, (fastest, sign) in enumerate(extremes)
+    )
+    changes = (_measure(trunk, fastest, sign, part, params) for fastest, sign, part in rows)
     return tuple(c for c in changes if c is not None)
 
 
 def _cut_out(
-    found: list[tuple[int, float]], i: int, speed: Floats, rate_hz: float, params: RisingParams
+    extremes: list[tuple[int, float]], i: int, speed: Floats, rate_hz: float, params: RisingParams
 ) -> tuple[int, int]:
     """Samples around one fastest moment that contain no other transition of its size."""
-    at, _ = found[i]
+    fastest, _ = extremes[i]
     reach = round(params.reach_s * rate_hz)
-    rivals = [k for k, _ in found if k != at and abs(speed[k]) >= 0.5 * abs(speed[at])]
-    before = max((k for k in rivals if k < at), default=at - 2 * reach)
-    after = min((k for k in rivals if k > at), default=at + 2 * reach)
-    low, high = max(at - reach, (before + at) // 2), min(at + reach, (at + after) // 2)
+    rivals = [k for k, _ in extremes if k != fastest and abs(speed[k]) >= 0.5 * abs(speed[fastest])]
+    previous_rival = max((k for k in rivals if k < fastest), default=fastest - 2 * reach)
+    next_rival = min((k for k in rivals if k > fastest), default=fastest + 2 * reach)
+    low, high = (
+        max(fastest - reach, (previous_rival + fastest) // 2),
+        min(fastest + reach, (fastest + next_rival) // 2),
+    )
     return max(0, low), min(len(speed), high + 1)
 
 
@@ -130,11 +136,11 @@ def _measure(
         return None
     forward = int(np.argmax(speed[: peak + 1]))
     back = peak + int(np.argmin(speed[peak:]))
-    before = np.flatnonzero(speed[: forward + 1] < params.edge * speed[forward])
-    after = np.flatnonzero(speed[back:] > params.edge * speed[back])
-    if not len(before) or not len(after):
+    start_candidates = np.flatnonzero(speed[: forward + 1] < params.edge * speed[forward])
+    end_candidates = np.flatnonzero(speed[back:] > params.edge * speed[back])
+    if not len(start_candidates) or not len(end_candidates):
         return None
-    start, end = int(before[-1]) + 1, back + int(after[0])
+    start, end = int(start_candidates[-1]) + 1, back + int(end_candidates[0])
     bow = float(lean[peak] - lean[start])
     height = _height_change(trunk, low + start, low + end)
     if bow < params.lean_rad or sign * height < params.height_m:
@@ -167,10 +173,10 @@ def _lean(trunk: TrunkMotion, low: int, high: int, params: RisingParams) -> Floa
     return np.asarray(np.arctan2(sign * (up @ axes[0]), up @ (middle / np.linalg.norm(middle))))
 
 
-def _greatest_lean(lean: Floats, speed: Floats, at: int, rate_hz: float) -> int | None:
+def _greatest_lean(lean: Floats, speed: Floats, fastest: int, rate_hz: float) -> int | None:
     """Sample of the maximum lean, near the fastest vertical movement."""
     near = round(1.5 * rate_hz)
-    low, high = max(1, at - near), min(len(lean) - 1, at + near)
+    low, high = max(1, fastest - near), min(len(lean) - 1, fastest + near)
     if high - low < 3:
         return None
     ramp = np.interp(np.arange(len(lean)), [low, high], [lean[low], lean[high]])

@@ -133,8 +133,8 @@ def _choose(
     """The longest quiet standing within the manually given limits; None if too short."""
     low = 0.0 if limits.start_s is None else limits.start_s
     high = float(recording.t_s[-1]) if limits.end_s is None else limits.end_s
-    found = find_rest_windows(recording, STANDING_QUIETLY, (segment,))  # type: ignore[arg-type]
-    parts = [(max(a, low), min(b, high)) for a, b in found]
+    windows = find_rest_windows(recording, STANDING_QUIETLY, (segment,))  # type: ignore[arg-type]
+    parts = [(max(a, low), min(b, high)) for a, b in windows]
     best = max(parts, key=lambda w: w[1] - w[0], default=(0.0, 0.0))
     length = best[1] - best[0]
     if length < params.shortest_s:

@@ -65,13 +65,13 @@ def measure_tug(
         }
     if down is not None:
         values["tug_stand_to_sit_s"] = end - down.start_s
-    between = [t for t in turns if start < t.start_s and t.start_s < end]
-    if len(between) > 2:
+    inner_turns = [t for t in turns if start < t.start_s and t.start_s < end]
+    if len(inner_turns) > 2:
         # the way to the mark has one turn: the last one is before the chair
-        between = [max(between[:-1], key=lambda t: abs(t.angle_rad)), between[-1]]
+        inner_turns = [max(inner_turns[:-1], key=lambda t: abs(t.angle_rad)), inner_turns[-1]]
     segments: tuple[TimedSegment, ...] = ()
-    if rise is not None and len(between) == 2:
-        first, last = between
+    if rise is not None and len(inner_turns) == 2:
+        first, last = inner_turns
         segments = _cut(start, end, rise, first, last)
         values |= {f"tug_{s.name}_s": s.duration_s for s in segments}
         values |= {
@@ -80,10 +80,10 @@ def measure_tug(
             "tug_final_turn_velocity_dps": degrees(last.peak_rad_s),
         }
     more = sum(c.kind == SIT_TO_STAND and c.start_s >= end for c in changes)
-    again = plural(more, ONCE_MORE, Message(AGAIN, n=more))
-    told = (Notice("more_tests", again, severity="info"),) if more else ()
-    rows = state_figures(values, NAMES, "turn_missing" if len(between) < 2 else "no_rise")
-    return FunctionalTest(start, end, segments, rows, trunk.segment, corrected, told)
+    message = plural(more, ONCE_MORE, Message(AGAIN, n=more))
+    notices = (Notice("more_tests", message, severity="info"),) if more else ()
+    rows = state_figures(values, NAMES, "turn_missing" if len(inner_turns) < 2 else "no_rise")
+    return FunctionalTest(start, end, segments, rows, trunk.segment, corrected, notices)
 
 
 def _cut(start: float, end: float, rise: PostureChange, first: Turn, last: Turn) -> tuple[TimedSegment, ...]:
@@ -111,5 +111,5 @@ def _choose(
         if down is not None and any(rise.start_s < t.start_s < down.end_s for t in turns):
             return rise, down
     first = rises[0] if rises else None
-    after = -1.0 if first is None else first.end_s
-    return first, next((c for c in changes if c.kind == STAND_TO_SIT and c.start_s >= after), None)
+    earliest_s = -1.0 if first is None else first.end_s
+    return first, next((c for c in changes if c.kind == STAND_TO_SIT and c.start_s >= earliest_s), None)

@@ -79,10 +79,10 @@ def follow_way(
             if s.side == side and s.end_s > start_s and s.start_s < end_s and s.end_s - s.start_s < 3.0
         ]
         table = np.array(rows, np.float64).reshape(-1, 3)
-        known = table[np.isfinite(table[:, 2]), 2]
-        if len(known) < 3:
+        lengths_known = table[np.isfinite(table[:, 2]), 2]
+        if len(lengths_known) < 3:
             continue
-        table[np.isnan(table[:, 2]), 2] = np.median(known)
+        table[np.isnan(table[:, 2]), 2] = np.median(lengths_known)
         way = np.zeros(len(grid))
         for a, b, length in table:
             way += length * np.clip((grid - a) / (b - a), 0.0, 1.0)

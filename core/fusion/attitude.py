@@ -210,7 +210,7 @@ class _Runs:
 
 def estimate_orientation(
     q_rest: Floats,
-    at: int,
+    start_sample: int,
     gyr: SampleSeries,
     acc: SampleSeries,
     valid: Bools,
@@ -218,7 +218,8 @@ def estimate_orientation(
     rest_norm: float,
     params: AttitudeParams,
 ) -> Floats:
-    """Orientation (n, 4) of a whole recording from a known orientation at sample `at`, without phase lag.
+    """Orientation (n, 4) of a whole recording from a known orientation at sample `start_sample`, without
+    phase lag.
 
     The filter runs to the end, back to the start and forward again; the result is halfway between the last
     backward and the last forward run. Backward the rates are negated and the order reversed, which with the
@@ -237,9 +238,12 @@ def estimate_orientation(
     if not stretches:
         out[:] = q_rest
         return out
-    home = min(range(len(stretches)), key=lambda k: max(stretches[k][0] - at, at - stretches[k][1], 0))
+    home = min(
+        range(len(stretches)),
+        key=lambda k: max(stretches[k][0] - start_sample, start_sample - stretches[k][1], 0),
+    )
     a, b = stretches[home]
-    runs.smooth(out[a : b + 1], q_rest, min(max(at, a), b), a, b)
+    runs.smooth(out[a : b + 1], q_rest, min(max(start_sample, a), b), a, b)
     out[:a], out[b + 1 :] = out[a], out[b]
     for a, b in stretches[home + 1 :]:
         runs.smooth(out[a : b + 1], out[a - 1].copy(), a, a, b, 0.0)

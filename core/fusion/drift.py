@@ -111,10 +111,10 @@ def remove_relative_drift(
 
 def _find_headings(q: Floats) -> NDArray[np.complex128]:
     """Headings (n,) of a segment as complex numbers of length 1."""
-    found = np.empty(len(q), np.complex128)
+    headings = np.empty(len(q), np.complex128)
     for part in cut_blocks(len(q)):
-        found[part] = np.exp(1j * yaw(q[part]))
-    return found
+        headings[part] = np.exp(1j * yaw(q[part]))
+    return headings
 
 
 def _drift(
@@ -167,8 +167,8 @@ def _smooth(relative: Floats, used: Bools, rate_hz: float, params: DriftParams) 
         vectors.imag, sigma, mode="constant"
     )
     mass = gaussian_filter1d(weight, sigma, mode="constant") * sigma * np.sqrt(2 * np.pi) * step / rate_hz
-    known = np.flatnonzero(mass >= params.least_s)
-    if not len(known):
-        known = np.array([int(np.argmax(mass))])
-    angle = np.unwrap(np.angle(total[known]))
-    return np.interp(np.arange(len(used)), known * step + 0.5 * step, angle)
+    indices = np.flatnonzero(mass >= params.least_s)
+    if not len(indices):
+        indices = np.array([int(np.argmax(mass))])
+    angle = np.unwrap(np.angle(total[indices]))
+    return np.interp(np.arange(len(used)), indices * step + 0.5 * step, angle)

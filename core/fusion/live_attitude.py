@@ -29,22 +29,38 @@ def _settle(state, force):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _turn(  # type: ignore[no-untyped-def]
-    acc, gyr, valid, still, look, which, bias, norm, mount, dt, kp, relearn_s, state, doubt, rest, out, known
+    acc,
+    gyr,
+    valid,
+    still,
+    look,
+    which,
+    bias,
+    norm,
+    mount,
+    dt,
+    kp,
+    relearn_s,
+    state,
+    doubt,
+    force_sum,
+    out,
+    is_known,
 ):
     """Advance the filters of some sensors, of which the first still.shape[1] are feet.
 
     Parameters
     ----------
-    still, look : (T, feet). state : (f, 9), doubt : (feet,), rest : (feet, 3) advanced in place: s since the
-        orientation was lost, −1 = known; sum of the force in W over the rest.
-    out : (T, f, 4) written, segment to W. known : (T, f) written.
+    still, look : (T, feet). state : (f, 9), doubt : (feet,), force_sum : (feet, 3) advanced in place: s since
+        the orientation was lost, −1 = known; sum of the force in W over the rest.
+    out : (T, f, 4) written, segment to W. is_known : (T, f) written.
     """
     T = acc.shape[0]
     f, w, ok, q = np.empty((T, 3)), np.empty((T, 3)), np.empty(T, np.bool_), np.empty((T, 4))
     for s in range(which.shape[0]):
         i, foot = which[s], s < still.shape[1]
         for k in range(T):
-            ok[k] = known[k, s] = valid[k, i]
+            ok[k] = is_known[k, s] = valid[k, i]
             for c in range(3):
                 f[k, c], w[k, c] = acc[k, i, c], gyr[k, i, c] - bias[s, c]
         first = 0
@@ -65,26 +81,26 @@ def _turn(  # type: ignore[no-untyped-def]
                         if doubt[s] * kp >= 1.0:
                             # the filter has learnt its tilt again by itself
                             doubt[s] = -1.0
-                    known[e, s] = ok[e] and doubt[s] < 0.0
+                    is_known[e, s] = ok[e] and doubt[s] < 0.0
                     if not still[e, s]:
-                        rest[s, :] = 0.0
+                        force_sum[s, :] = 0.0
                         continue
                     a, b, c, d = q[e]
                     x, y, z = f[e]
                     p0, p1, p2, p3 = multiply(a, b, c, d, 0.0, x, y, z)
                     _, x, y, z = multiply(p0, p1, p2, p3, a, -b, -c, -d)
-                    rest[s, 0] += x
-                    rest[s, 1] += y
-                    rest[s, 2] += z
+                    force_sum[s, 0] += x
+                    force_sum[s, 1] += y
+                    force_sum[s, 2] += z
                 if look[k, s]:
-                    tilt = np.arctan2(np.sqrt(rest[s, 0] ** 2 + rest[s, 1] ** 2), rest[s, 2])
+                    tilt = np.arctan2(np.sqrt(force_sum[s, 0] ** 2 + force_sum[s, 1] ** 2), force_sum[s, 2])
                     lost = doubt[s] >= 0.0
                     if lost or tilt > LOST_TILT:
-                        _settle(state[s], rest[s])
+                        _settle(state[s], force_sum[s])
                         state[s, 7], doubt[s] = np.inf, -1.0
                         q[k] = state[s, :4]
                         # what was measured before does not fit what comes
-                        known[k, s] = lost
+                        is_known[k, s] = lost
             first = past
         m = mount[s]
         for k in range(T):
@@ -136,9 +152,9 @@ class AttitudeTracker:
         acc, gyr : (T, n, 3) as measured. valid : (T, n). still : (T, feet) the foot is at rest.
         """
         out = np.empty((len(acc), len(self._which), 4))
-        known = np.empty(out.shape[:2], np.bool_)
+        is_known = np.empty(out.shape[:2], np.bool_)
         _turn(
             acc, gyr, valid, still, self._looks.push(still), self._which, self._bias, self._norm, self._mount,
-            *self._scalars, self._state, self._doubt, self._rest, out, known,
+            *self._scalars, self._state, self._doubt, self._rest, out, is_known,
         )  # fmt: skip
-        return out, known
+        return out, is_known

@@ -34,7 +34,7 @@ QUICK_S: Final = 1.0
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _hold(  # type: ignore[no-untyped-def]
-    q, gyr, valid, lead, dt, moving, scalars, first, mean, seen, turn, ahead, quiet
+    q, gyr, valid, lead, dt, moving, scalars, first, mean, counts, turn, ahead, quiet
 ):
     """Rotate segments q (T, n, 4) about the vertical in place.
 
@@ -42,7 +42,7 @@ def _hold(  # type: ignore[no-untyped-def]
     ----------
     gyr : (T, n, 3) of their sensors. lead : index of the reference, −1 = the mean of all. moving : rad/s.
     scalars : samples of the reference and minimum after a gap; mean_s, quick_s, rad of a turn. first, mean :
-        (n, 2) sum of the reference, running mean. seen : (n, 2) samples in both. turn : (n,) rad. ahead :
+        (n, 2) sum of the reference, running mean. counts : (n, 2) samples in both. turn : (n,) rad. ahead :
         (2,) slow heading. quiet : (1,) samples since the last movement.
     """
     n = q.shape[1]
@@ -60,7 +60,7 @@ def _hold(  # type: ignore[no-untyped-def]
             if valid[k, i] and speed > moving * moving:
                 quiet[0] = 0
             if not valid[k, i]:
-                seen[i, 1] = 0
+                counts[i, 1] = 0
             # of the corrected headings, so that those that drift do not lead
             if lead < 0:
                 whole &= valid[k, i]
@@ -83,15 +83,15 @@ def _hold(  # type: ignore[no-untyped-def]
                     continue
                 rx = heading[i, 0] * cx + heading[i, 1] * cy
                 ry = heading[i, 1] * cx - heading[i, 0] * cy
-                if seen[i, 0] < scalars[0]:
+                if counts[i, 0] < scalars[0]:
                     first[i, 0] += rx
                     first[i, 1] += ry
-                    seen[i, 0] += 1
-                seen[i, 1] += 1
-                share = max(dt / scalars[2], 1.0 / seen[i, 1])
+                    counts[i, 0] += 1
+                counts[i, 1] += 1
+                share = max(dt / scalars[2], 1.0 / counts[i, 1])
                 mean[i, 0] += share * (rx - mean[i, 0])
                 mean[i, 1] += share * (ry - mean[i, 1])
-                if seen[i, 0] >= scalars[0] and seen[i, 1] >= scalars[1]:
+                if counts[i, 0] >= scalars[0] and counts[i, 1] >= scalars[1]:
                     a, b = mean[i], first[i]
                     turn[i] = atan2(a[1] * b[0] - a[0] * b[1], a[0] * b[0] + a[1] * b[1])
         for i in range(n):

@@ -60,14 +60,14 @@ def estimate_orientations(
             signals, mounted, calibration.zero, recording.rate_hz, params.attitude
         )
         valid[segment] = signals.valid
-    q, drift, told = remove_relative_drift(q, valid, calibration, recording.rate_hz, params.drift)
+    q, drift, drift_notices = remove_relative_drift(q, valid, calibration, recording.rate_hz, params.drift)
     return Orientations(
         t_s=recording.t_s,
         rate_hz=recording.rate_hz,
         q=q,
         valid=valid,
         engine="mahony",
-        notices=tuple(told),
+        notices=tuple(drift_notices),
         diagnostics={"kp": params.attitude.kp, "largest_drift_rad": drift},
     )
 
@@ -79,9 +79,9 @@ def segment_orientation(
     start = mounted.start_q
     if start is None:
         start = from_matrix(R_NEUTRAL @ mounted.R_segment_sensor)
-    at = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.valid) - 1)
+    middle = min(round(0.5 * (zero[0] + zero[1]) * rate_hz), len(signals.valid) - 1)
     gyr, acc = HeldSeries(signals, "gyr", mounted.gyro_bias), HeldSeries(signals, "acc")
-    q = estimate_orientation(start, at, gyr, acc, signals.valid, rate_hz, mounted.rest_norm, params)
+    q = estimate_orientation(start, middle, gyr, acc, signals.valid, rate_hz, mounted.rest_norm, params)
     back = conjugate(from_matrix(mounted.R_segment_sensor))
     for part in cut_blocks(len(q)):
         q[part] = multiply(q[part], back)

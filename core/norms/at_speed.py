@@ -67,10 +67,10 @@ class CurveModel:
 
     def relative_sd(self, v: float) -> Floats:
         """Standard deviation (101,) relative to that at 1.25 m/s; linear between the speeds of the table."""
-        above = int(np.clip(np.searchsorted(self.speeds, v), 1, len(self.speeds) - 1))
-        low, high = self.speeds[above - 1 : above + 1]
+        upper = int(np.clip(np.searchsorted(self.speeds, v), 1, len(self.speeds) - 1))
+        low, high = self.speeds[upper - 1 : upper + 1]
         share = float(np.clip((v - low) / (high - low), 0.0, 1.0))
-        return np.asarray((1.0 - share) * self.spread[above - 1] + share * self.spread[above])
+        return np.asarray((1.0 - share) * self.spread[upper - 1] + share * self.spread[upper])
 
 
 @cache
@@ -79,16 +79,16 @@ def curve_models() -> Mapping[str, CurveModel]:
     spreads: dict[str, dict[float, list[float]]] = {}
     table = read_columns("norm_speed_matched_adult", "variable", "dimensionless_speed", "sd_deg")
     for (variable, speed), cells in groupby(table, key=itemgetter(0, 1)):
-        at = spreads.setdefault(variable, {}).setdefault(float(speed), [])
-        at.extend(float(sd) for _, _, sd in cells)
-    found: dict[str, tuple[list[list[float]], int]] = {}
+        values = spreads.setdefault(variable, {}).setdefault(float(speed), [])
+        values.extend(float(sd) for _, _, sd in cells)
+    coefficients: dict[str, tuple[list[list[float]], int]] = {}
     for r in read_rows("speed_model_coefficients"):
         if r["variable"] in spreads:
-            rows, _ = found.get(r["variable"], ([], 0))
+            rows, _ = coefficients.get(r["variable"], ([], 0))
             rows.append([float(r[c]) for c in ("b0", "b1_ln_v", "b2_ln_v_sq")])
-            found[r["variable"]] = rows, int(r["n_subjects"])
+            coefficients[r["variable"]] = rows, int(r["n_subjects"])
     models = {}
-    for variable, (rows, n) in found.items():
+    for variable, (rows, n) in coefficients.items():
         own = spreads[variable]
         speeds = sorted(own)
         spread = np.array([own[v] for v in speeds])
@@ -112,7 +112,7 @@ def bands_at_speed(age: float | None, v: float) -> Mapping[str, NormBand]:
     v : v* of `WalkingSpeed.norm_speed`, 0.085 to 0.439.
     """
     bands, models = adult_kinematics(age).bands, curve_models()
-    found = {}
+    norm_bands = {}
     for variable, model in models.items():
         band = bands.get(variable)
         if band is None:
@@ -121,10 +121,10 @@ def bands_at_speed(age: float | None, v: float) -> Mapping[str, NormBand]:
         mean.setflags(write=False)
         sd.setflags(write=False)
         source = f"{SOURCE}; level: {band.source}"
-        found[variable] = NormBand(
+        norm_bands[variable] = NormBand(
             variable, mean, sd, model.n, ASKED, source, band.zero, band.confidence, band.note
         )
-    return found
+    return norm_bands
 
 
 _ROWS: Final[Mapping[str, str]] = {
@@ -163,7 +163,7 @@ def angle_values_at_speed(
     usual = angle_values(age, anatomical).values
     rows = {r["parameter"]: r for r in read_rows("discrete_model_rehazenter52")}
     bands = bands_at_speed(age, v)
-    found = {}
+    references = {}
     for name, norm in usual.items():
         sides = norm.difference_sd or 0.0
         if (row := rows.get(_ROWS.get(name, ""))) is not None:
@@ -181,7 +181,7 @@ def angle_values_at_speed(
             sd = hypot(norm.sd, HIP_SD_DEG) if figure.variable == "hip_flexion" else grown
         else:
             continue
-        found[name] = NormValue(
+        references[name] = NormValue(
             name=name,
             mean=norm.mean + change,
             sd=sd,
@@ -192,7 +192,7 @@ def angle_values_at_speed(
             comparable=norm.comparable,
             note=norm.note,
         )
-    return found
+    return references
 
 
 def _figure_of(name: str) -> CurveFigure:
@@ -215,8 +215,8 @@ def _growth(figure: CurveFigure, bands: Mapping[str, NormBand], usual: Mapping[s
     """Ratio of the spread at this speed to that at comfortable speed, at the point where a parameter is
     read.
     """
-    now, then = (of[figure.variable].sd_deg[_window(figure)] for of in (bands, usual))
-    return float(np.sqrt(np.mean(now**2) / np.mean(then**2)))
+    now, usual_sd = (table[figure.variable].sd_deg[_window(figure)] for table in (bands, usual))
+    return float(np.sqrt(np.mean(now**2) / np.mean(usual_sd**2)))
 
 
 def walkway_values_at_speed(v: float, leg_m: float) -> Mapping[str, NormValue]:
@@ -247,11 +247,11 @@ def walkway_values_at_speed(v: float, leg_m: float) -> Mapping[str, NormValue]:
         "step_time_s": (60.0 / per_min, 60.0 / per_min * cadence_sd),
         "stride_time_s": (120.0 / per_min, 120.0 / per_min * cadence_sd),
     }
-    found = {}
+    values = {}
     for name, (mean, sd) in figures.items():
         note = explain_difference(_SHARE_OF.get(name, name))
-        found[name] = NormValue(name, mean, sd, N_ADULTS, ASKED, SOURCE, comparable=not note, note=note)
-    return found
+        values[name] = NormValue(name, mean, sd, N_ADULTS, ASKED, SOURCE, comparable=not note, note=note)
+    return values
 
 
 _SHARE_OF: Final = dict.fromkeys(
@@ -286,15 +286,15 @@ def reference_at_speed(age: float | None, v: float, comfortable: CurveReference)
 
 
 def _grown(spreads: Mapping[str, ScoreSpread], grows: Mapping[str, float]) -> dict[str, ScoreSpread]:
-    found = {name: _times(spreads[name], factor) for name, factor in grows.items()}
+    grown = {name: _times(spreads[name], factor) for name, factor in grows.items()}
     for profile, variables in PROFILES.items():
         if any(v not in grows for v in variables):
             continue
         weights = np.array([spreads[v].mean_deg ** 2 for v in variables])
         factor = float(np.sqrt(weights @ np.array([grows[v] ** 2 for v in variables]) / weights.sum()))
         for part in ("side", "overall"):
-            found[f"{profile}_{part}"] = _times(spreads[f"{profile}_{part}"], factor)
-    return found
+            grown[f"{profile}_{part}"] = _times(spreads[f"{profile}_{part}"], factor)
+    return grown
 
 
 def _times(s: ScoreSpread, factor: float) -> ScoreSpread:

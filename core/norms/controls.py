@@ -110,7 +110,7 @@ def control_group(
         if _within(s.age, age) and _within(s.speed_mps, speed_mps) and sex in (None, s.sex):
             people.setdefault(s.person, []).append(s)
     n = len(people)
-    who = ", ".join(
+    group = ", ".join(
         part
         for part in (
             name,
@@ -124,18 +124,18 @@ def control_group(
         f"{{value}} {plural(n, 'control', 'controls')} of this clinic, same sensors and method", value=n
     )
     if n < FEWEST:
-        return ControlGroup(n, who, source, reason="few_controls")
+        return ControlGroup(n, group, source, reason="few_controls")
     values = [_mean_values(s) for s in people.values()]
     curves = [_mean_curves(s) for s in people.values()]
-    bands = _bands(curves, who, source)
+    bands = _bands(curves, group, source)
     reference = CurveReference(
-        {v: b.mean_deg for v, b in bands.items()}, leave_one_out(curves), "standing", n, who, source
+        {v: b.mean_deg for v, b in bands.items()}, leave_one_out(curves), "standing", n, group, source
     )
     return ControlGroup(
         n,
-        who,
+        group,
         source,
-        _values(values, who, source),
+        _values(values, group, source),
         bands,
         reference if bands else None,
         note="small_group" if n < FEW else None,
@@ -152,15 +152,15 @@ def mean_curves(curves: CycleCurves, estimated: Collection[str] = ()) -> MeanCur
     ----------
     estimated : variables not measured by two sensors, which cannot serve as a reference.
     """
-    found: dict[Side, dict[str, Floats]] = {}
+    means: dict[Side, dict[str, Floats]] = {}
     if curves.zero != "standing":
-        return found
+        return means
     for variable, sides in curves.curves.items():
         for side in () if variable in estimated else sides:
             mean = mean_curve(curves, variable, side)
             if mean.mean is not None and mean.n >= COMPARED:
-                found.setdefault(side, {})[variable] = np.degrees(mean.mean)
-    return found
+                means.setdefault(side, {})[variable] = np.degrees(mean.mean)
+    return means
 
 
 def _within(value: float | None, limits: Range | None) -> bool:
@@ -169,23 +169,23 @@ def _within(value: float | None, limits: Range | None) -> bool:
 
 def _mean_values(sessions: Sequence[ControlSession]) -> Values:
     """A person's mean of every measured parameter over all sessions with enough strides."""
-    found: dict[tuple[str, Side | None], list[float]] = {}
+    collected: dict[tuple[str, Side | None], list[float]] = {}
     for s in sessions:
         for p in s.parameters:
             if p.mean is not None and has_enough_values(p) and not p.estimated:
-                found.setdefault((p.name, p.side), []).append(p.mean)
-    return {key: v[0] if len(v) == 1 else float(np.mean(v)) for key, v in found.items()}
+                collected.setdefault((p.name, p.side), []).append(p.mean)
+    return {key: v[0] if len(v) == 1 else float(np.mean(v)) for key, v in collected.items()}
 
 
 def _mean_curves(sessions: Sequence[ControlSession]) -> MeanCurves:
-    found: dict[Side, dict[str, list[Floats]]] = {}
+    collected: dict[Side, dict[str, list[Floats]]] = {}
     for s in sessions:
         for side, curves in s.curves.items():
             for variable, curve in curves.items():
-                found.setdefault(side, {}).setdefault(variable, []).append(curve)
+                collected.setdefault(side, {}).setdefault(variable, []).append(curve)
     return {
         side: {v: c[0] if len(c) == 1 else np.mean(c, axis=0) for v, c in own.items()}
-        for side, own in found.items()
+        for side, own in collected.items()
     }
 
 
@@ -193,18 +193,18 @@ def _values(people: Sequence[Values], group: str, source: str) -> dict[str, Norm
     """Mean over people and sides; sd of one side between people; sd of left − right."""
     # name → side → person → value
     by_name: dict[str, dict[Side | None, dict[int, float]]] = {}
-    for who, p in enumerate(people):
+    for person, p in enumerate(people):
         for (name, side), value in p.items():
-            by_name.setdefault(name, {}).setdefault(side, {})[who] = value
-    found: dict[str, NormValue] = {}
+            by_name.setdefault(name, {}).setdefault(side, {})[person] = value
+    norm_values: dict[str, NormValue] = {}
     for name, by_side in by_name.items():
         sides = [by_side.get(s, {}) for s in (None, *SIDES)]
-        columns = [np.array(list(of.values())) for of in sides if len(of) >= FEWEST]
+        columns = [np.array(list(by_person.values())) for by_person in sides if len(by_person) >= FEWEST]
         if not columns:
             continue
         _, left, right = sides
-        differences = [x - right[who] for who, x in left.items() if who in right]
-        found[name] = NormValue(
+        differences = [x - right[person] for person, x in left.items() if person in right]
+        norm_values[name] = NormValue(
             name=name,
             mean=float(np.mean([np.mean(c) for c in columns])),
             sd=float(np.sqrt(np.mean([np.var(c, ddof=1) for c in columns]))),
@@ -213,11 +213,11 @@ def _values(people: Sequence[Values], group: str, source: str) -> dict[str, Norm
             source=source,
             difference_sd=float(np.std(differences, ddof=1)) if len(differences) >= FEWEST else None,
         )
-    return found
+    return norm_values
 
 
 def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, NormBand]:
-    found: dict[str, NormBand] = {}
+    bands: dict[str, NormBand] = {}
     for variable in dict.fromkeys(v for p in people for own in p.values() for v in own):
         gathered = gather_curves(people, variable)
         means = gathered.means()
@@ -225,7 +225,7 @@ def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, N
             continue
         sides = [gathered.curves[gathered.there[:, k], k] for k in range(len(SIDES))]
         spread = [np.var(rows, axis=0, ddof=1) for rows in sides if len(rows) > 1]
-        found[variable] = NormBand(
+        bands[variable] = NormBand(
             variable=variable,
             mean_deg=np.mean(means, axis=0),
             sd_deg=np.sqrt(np.mean(spread, axis=0)),
@@ -236,4 +236,4 @@ def _bands(people: Sequence[MeanCurves], group: str, source: str) -> dict[str, N
             confidence="normal" if variable in SAGITTAL else "low",
             note="",
         )
-    return found
+    return bands

@@ -97,8 +97,8 @@ def look_up_norms(
     contacts_s : uncertainty of the contacts (`GaitEvents.contact_uncertainty_s`), 0 = exact, None = unknown;
         phases as a percentage of the stride are compared only if it is small.
     """
-    found = _look_up(age, sex, speed_mps, height_m, anatomical, treadmill=treadmill)
-    return replace(found, values=withdraw_shares(found.values, contacts_s))
+    norms = _look_up(age, sex, speed_mps, height_m, anatomical, treadmill=treadmill)
+    return replace(norms, values=withdraw_shares(norms.values, contacts_s))
 
 
 def _look_up(

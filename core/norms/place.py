@@ -82,7 +82,7 @@ def _placed(distance: float, sd: float, norm: NormValue, uncertainty: float = 0.
     if sd <= 0.0:
         return NormPlacement(None, None, None, norm, "no_spread")
     z = distance / sd
-    below = percentile_of_z(z) if norm.n is None else percentile_of_sample(z, norm.n)
+    percentile = percentile_of_z(z) if norm.n is None else percentile_of_sample(z, norm.n)
     sure = max(abs(z) - uncertainty / sd, 0.0)
     grade: Grade = 0 if sure <= GRADES_SD[0] else 1 if sure <= GRADES_SD[1] else 2
-    return NormPlacement(z, below, grade, norm)
+    return NormPlacement(z, percentile, grade, norm)

@@ -92,10 +92,10 @@ def side_profile(scores: Mapping[str, float], variables: Sequence[str]) -> float
 def overall_profile(scores: Mapping[Side, Mapping[str, float]], variables: Sequence[str]) -> float | None:
     """RMS of the GVS of both sides with the left pelvis only, None unless all are available."""
     left, right = scores.get("left", {}), scores.get("right", {})
-    rest = [v for v in variables if v not in PELVIS]
-    if any(v not in left for v in variables) or any(v not in right for v in rest):
+    without_pelvis = [v for v in variables if v not in PELVIS]
+    if any(v not in left for v in variables) or any(v not in right for v in without_pelvis):
         return None
-    return float(_rms(np.array([left[v] for v in variables] + [right[v] for v in rest])))
+    return float(_rms(np.array([left[v] for v in variables] + [right[v] for v in without_pelvis])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,20 +112,20 @@ class PeopleCurves:
 
     def means(self) -> Floats:
         """Mean curve (n, 101) over the available sides, for everyone with at least one, in order."""
-        known = self.there.sum(axis=1)
-        return np.asarray(self.curves.sum(axis=1)[known > 0] / known[known > 0, None])
+        counts = self.there.sum(axis=1)
+        return np.asarray(self.curves.sum(axis=1)[counts > 0] / counts[counts > 0, None])
 
 
 def gather_curves(people: Sequence[MeanCurves], variable: str) -> PeopleCurves:
     """Collect the curves of one variable; without any curve the arrays have no samples."""
     rows = [[person.get(side, {}).get(variable) for side in SIDES] for person in people]
-    known = [row for pair in rows for row in pair if row is not None]
+    known_curves = [row for pair in rows for row in pair if row is not None]
     shape = len(people), len(SIDES)
-    there = np.array([[row is not None for row in pair] for pair in rows], np.bool_).reshape(shape)
-    curves = np.zeros((*shape, len(known[0]) if known else 0))
-    if known:
-        curves[there] = known
-    return PeopleCurves(curves, there)
+    available = np.array([[row is not None for row in pair] for pair in rows], np.bool_).reshape(shape)
+    curves = np.zeros((*shape, len(known_curves[0]) if known_curves else 0))
+    if known_curves:
+        curves[available] = known_curves
+    return PeopleCurves(curves, available)
 
 
 def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpread]]:
@@ -134,36 +134,38 @@ def leave_one_out(people: Sequence[MeanCurves]) -> dict[Mode, dict[str, ScoreSpr
     Each side counts separately; percentiles are linear between order statistics, sd with n − 1.
     """
     shape = len(people), len(SIDES), len(NINE)
-    scores, known = {mode: np.zeros(shape) for mode in MODES}, np.zeros(shape, np.bool_)
+    scores, available = {mode: np.zeros(shape) for mode in MODES}, np.zeros(shape, np.bool_)
     for k, variable in enumerate(NINE):
         gathered = gather_curves(people, variable)
-        own, who = gathered.means(), gathered.there.any(axis=1)
+        own, has_curves = gathered.means(), gathered.there.any(axis=1)
         if len(own) < 2:
             continue
-        known[..., k] = gathered.there
-        others = (own.sum(axis=0) - own) / (len(own) - 1)
+        available[..., k] = gathered.there
+        mean_of_others = (own.sum(axis=0) - own) / (len(own) - 1)
         for mode in MODES:
-            scores[mode][who, :, k] = gvs(gathered.curves[who], others[:, None], mode)
-    return {mode: _find_spreads(scores[mode], known) for mode in MODES}
+            scores[mode][has_curves, :, k] = gvs(gathered.curves[has_curves], mean_of_others[:, None], mode)
+    return {mode: _find_spreads(scores[mode], available) for mode in MODES}
 
 
-def _find_spreads(scores: Floats, known: Bools) -> dict[str, ScoreSpread]:
+def _find_spreads(scores: Floats, available: Bools) -> dict[str, ScoreSpread]:
     """Spreads of every variable and profile of scores (people, 2, 9), where available."""
-    values = {variable: scores[..., k][known[..., k]] for k, variable in enumerate(NINE)}
+    values = {variable: scores[..., k][available[..., k]] for k, variable in enumerate(NINE)}
     flat = len(scores), len(SIDES) * len(NINE)
     for name, variables in PROFILES.items():
         left = [NINE.index(v) for v in variables]
         right = [len(NINE) + NINE.index(v) for v in variables if v not in PELVIS]
-        values[f"{name}_side"] = _find_profiles(scores, known, left)
-        values[f"{name}_overall"] = _find_profiles(scores.reshape(flat), known.reshape(flat), left + right)
+        values[f"{name}_side"] = _find_profiles(scores, available, left)
+        values[f"{name}_overall"] = _find_profiles(
+            scores.reshape(flat), available.reshape(flat), left + right
+        )
     return {name: _spread(x) for name, x in values.items() if len(x) > 1}
 
 
-def _find_profiles(scores: Floats, known: Bools, columns: Sequence[int]) -> Floats:
+def _find_profiles(scores: Floats, available: Bools, columns: Sequence[int]) -> Floats:
     """RMS of some columns (..., n) where all of them are available."""
     # `take` lays them side by side, so that each is added up as the profile of one person is
-    found = _rms(np.take(scores, columns, axis=-1))
-    return np.asarray(found[np.take(known, columns, axis=-1).all(axis=-1)])
+    profiles = _rms(np.take(scores, columns, axis=-1))
+    return np.asarray(profiles[np.take(available, columns, axis=-1).all(axis=-1)])
 
 
 def _rms(values: Floats) -> Floats:

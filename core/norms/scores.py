@@ -156,7 +156,7 @@ def score_curves(
     child = reference is None and wbds_group(age) is None
     reference = adult_reference() if reference is None else reference
     level = means.level if reference.zero == "anatomical" else means.own
-    found: list[Score] = []
+    scores: list[Score] = []
     for mode in MODES:
         own = level if mode == "raw" else means.own
         single = [
@@ -164,14 +164,14 @@ def score_curves(
             for side in SIDES
             for v in NINE
         ]
-        found += single
+        scores += single
         for profile in PROFILES:
             for side in (*SIDES, None):
-                found += _profile(profile, side, mode, single, reference)
+                scores += _profile(profile, side, mode, single, reference)
     if child:
-        found = [replace(s, value=None, n=0, healthy=None, percentile=None, reason=_CHILD) for s in found]
+        scores = [replace(s, value=None, n=0, healthy=None, percentile=None, reason=_CHILD) for s in scores]
     return Scores(
-        tuple(found),
+        tuple(scores),
         reference.n,
         reference.group,
         reference.source,
@@ -186,8 +186,8 @@ Key = tuple[str, Side]
 
 
 def _means(curves: CycleCurves) -> dict[Key, MeanCurve]:
-    found = {(v, side): mean_curve(curves, v, side) for v in NINE for side in curves.curves.get(v, {})}
-    return {key: mean for key, mean in found.items() if mean.mean is not None}
+    curve_means = {(v, side): mean_curve(curves, v, side) for v in NINE for side in curves.curves.get(v, {})}
+    return {key: mean for key, mean in curve_means.items() if mean.mean is not None}
 
 
 def _gvs(
@@ -196,7 +196,7 @@ def _gvs(
     mode: Mode,
     own: MeanCurve | None,
     means: CurveMeans,
-    known: CycleCurves,
+    metadata: CycleCurves,
     reference: CurveReference,
     estimated: bool,
 ) -> Score:
@@ -205,11 +205,11 @@ def _gvs(
     if variable not in reference.mean_deg:
         reason = "no_reference"
     elif (variable, side) not in means.own:
-        why = known.why.get(variable, {}).get(side)
-        reason = why or ("no_strides" if (variable, side) in means.there else "joint_missing")
+        reason_by_curve = metadata.why.get(variable, {}).get(side)
+        reason = reason_by_curve or ("no_strides" if (variable, side) in means.there else "joint_missing")
     elif estimated:
         reason = "estimated"
-    elif known.zero == "walking" and mode == "raw" and variable not in MEAN_ZERO:
+    elif metadata.zero == "walking" and mode == "raw" and variable not in MEAN_ZERO:
         reason, own = NO_STANDING, None
     elif own is None:
         reason = "no_level" if variable in MEAN_ZERO else "angle_zero_standing"
@@ -244,12 +244,24 @@ def _profile(
     n = 0 if value is None else min(s.n for s in part if s.value is not None)
     z = _z(value, healthy)
     zero = value is not None and value < NOTHING_DEG
-    why = reason or (None if z is not None else "score_zero" if zero else "no_reference")
-    below = None if z is None else percentile_of_z(z)
+    index_reason = reason or (None if z is not None else "score_zero" if zero else "no_reference")
+    percentile = None if z is None else percentile_of_z(z)
     index = None if z is None else 100.0 - 10.0 * z
     return [
-        Score(f"{profile}_deg", None, side, mode, value, "deg", n, healthy, below, missing, reason),
-        Score(GDI_STAR[profile], None, side, mode, index, "points", n, healthy, below, missing, why),
+        Score(f"{profile}_deg", None, side, mode, value, "deg", n, healthy, percentile, missing, reason),
+        Score(
+            GDI_STAR[profile],
+            None,
+            side,
+            mode,
+            index,
+            "points",
+            n,
+            healthy,
+            percentile,
+            missing,
+            index_reason,
+        ),
     ]
 
 

@@ -179,9 +179,9 @@ def comfortable_speed(age: float | None, sex: Sex | None) -> NormValue | None:
     children with only a range for the pace class.
     """
     if age is not None and sex is not None:
-        found = temporal_values(age, sex).values.get("gait_speed_mps")
-        if found is not None and found.comparable:
-            return found
+        norm = temporal_values(age, sex).values.get("gait_speed_mps")
+        if norm is not None and norm.comparable:
+            return norm
     group = wbds_group(age)
     if group is None:
         return None

@@ -81,7 +81,7 @@ class LiveCalibration:
 def finish_calibration(
     calibrated: CalibratedRecording,
     first: int,
-    worn: Sequence[Segment],
+    segments: Sequence[Segment],
     params: MountingParams,
     out: Collection[Segment] = (),
 ) -> LiveCalibration:
@@ -89,8 +89,8 @@ def finish_calibration(
 
     Parameters
     ----------
-    calibrated : result of `sagittal.core.calibration.calibrate`. worn : all segments, including those without
-        samples. out : those whose sensor does not measure, already reported.
+    calibrated : result of `sagittal.core.calibration.calibrate`. segments : all segments, including those
+        without samples. out : those whose sensor does not measure, already reported.
 
     Raises
     ------
@@ -104,8 +104,8 @@ def finish_calibration(
     notices = [*calibrated.calibration.notices, *mounted.assumed, *report_turned_axes(mounted.turned_rad)]
     if failure is not None:
         notices.append(Notice(failure.code, failure.message, failure.sensor))
-    notices += _missing(recording, [s for s in worn if s not in out])
-    checks = tuple(_check(s, calibrated, notices) for s in worn)
+    notices += _missing(recording, [s for s in segments if s not in out])
+    checks = tuple(_check(s, calibrated, notices) for s in segments)
     joints, _ = compare_sensors(recording, params.joints)
     agreed = Agreement(recording, misfits=measure_misfits(joints))
     return LiveCalibration(
@@ -122,7 +122,7 @@ def finish_calibration(
     )
 
 
-def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notice]:
+def _missing(recording: UniformRecording, segments: Sequence[Segment]) -> list[Notice]:
     return [
         Notice(
             "sensor_missing",
@@ -133,7 +133,7 @@ def _missing(recording: UniformRecording, worn: Sequence[Segment]) -> list[Notic
             ),
             sensor=s,
         )
-        for s in worn
+        for s in segments
         if s not in recording.sensors
     ]
 

@@ -101,8 +101,8 @@ class LiveCalibrator:
 
     def drain_standings(self) -> tuple[int, ...]:
         """Samples of the axis at the end of standing periods that began an attempt, since the last call."""
-        found, self._standings = tuple(self._standings), []
-        return found
+        ends, self._standings = tuple(self._standings), []
+        return ends
 
     def push(self, block: UniformBlock) -> LiveCalibration | None:
         """Process the next samples; returns the calibration, once, when it is complete.
@@ -113,7 +113,7 @@ class LiveCalibrator:
         if block.first != self._length:
             self._length = self._begun = block.first
             self._attempt = CalibrationSamples(self.wearer, block.first)
-        start, found = 0, None
+        start, calibration = 0, None
         while start < len(block):
             stop = min(len(block), start + self._tick - self._length % self._tick)
             self._length += stop - start
@@ -122,10 +122,10 @@ class LiveCalibrator:
                 if self._length % self._tick == 0:
                     if block.out is not None:
                         self._leave_out(block.out[stop - 1])
-                    found = self._judge()
-                if found is not None:
+                    calibration = self._judge()
+                if calibration is not None:
                     self._length += len(block) - stop
-                    return found
+                    return calibration
             start = stop
         return None
 
@@ -159,23 +159,25 @@ class LiveCalibrator:
         """Waiting or standing: check for data of every sensor, and for how long all have been still."""
         p, rate = self.params, self.wearer.rate_hz
         self._attempt.keep_last(round(p.looked_s * rate))
-        there = self._there()
-        complete = len(there) == len(self.wearer.segments) - len(self._out)
+        available = self._there()
+        complete = len(available) == len(self.wearer.segments) - len(self._out)
         patient = self._length - self._begun >= p.wait_s * rate
-        self.stage = "stand" if there and (complete or patient) else "waiting"
-        recording = self._attempt.recording(there)
-        seen = judge_standing(recording, p.mounting.calibration.rest)
-        self.view = replace(self.view, stood_s=seen.stood_s, walked_s=0.0, steps=0, checks=self._checks(seen))
-        if self.stage == "stand" and seen.stood_s >= p.stand_s:
-            self.stage, self._working = "walk", there
+        self.stage = "stand" if available and (complete or patient) else "waiting"
+        recording = self._attempt.recording(available)
+        standing = judge_standing(recording, p.mounting.calibration.rest)
+        self.view = replace(
+            self.view, stood_s=standing.stood_s, walked_s=0.0, steps=0, checks=self._checks(standing)
+        )
+        if self.stage == "stand" and standing.stood_s >= p.stand_s:
+            self.stage, self._working = "walk", available
             self.view = replace(self.view, ok=None, problem=None)
-            self._stand(recording, seen)
+            self._stand(recording, standing)
 
-    def _stand(self, recording: UniformRecording, seen: StandingNow) -> None:
+    def _stand(self, recording: UniformRecording, standing: StandingNow) -> None:
         """Start an attempt with this standing period; earlier samples, walking in particular, are
         discarded.
         """
-        self._attempt.keep_last(round(seen.stood_s * self.wearer.rate_hz))
+        self._attempt.keep_last(round(standing.stood_s * self.wearer.rate_hz))
         self._up, self._walked = find_upward_axes(recording), 0.0
         self._standings.append(self._length)
         self.view = replace(self.view, walked_s=0.0, steps=0)
@@ -183,14 +185,14 @@ class LiveCalibrator:
     def _there(self) -> tuple[Segment, ...]:
         """Segments with sensor data for most of the last second."""
         share = self._attempt.valid(round(self.wearer.rate_hz)).mean(axis=0)
-        there = (s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
-        return tuple(s for s in there if s not in self._out)
+        with_data = (s for s, x in zip(self.wearer.segments, share, strict=True) if x > 0.5)
+        return tuple(s for s in with_data if s not in self._out)
 
     def _look_for_walk(self) -> LiveCalibration | None:
         """Walking: check whether enough has been walked since standing."""
         p, rate = self.params, self.wearer.rate_hz
         recording = self._attempt.recording(self._working)
-        seen = judge_standing(cut_last_part(recording, p.kept_s), p.mounting.calibration.rest)
+        standing = judge_standing(cut_last_part(recording, p.kept_s), p.mounting.calibration.rest)
         calibration = p.mounting.calibration
         done = find_functional_movements(recording, calibration.functional).anywhere
         self._functional = bool(done.any())
@@ -198,27 +200,27 @@ class LiveCalibrator:
         self._ongoing = ongoing
         moving = moving_mask(recording, calibration.walking) | done
         walked = float(np.count_nonzero(moving) / rate)
-        stood = self.view.stood_s if walked and not seen.stood_s else seen.stood_s
-        self._walked, before = walked, self._walked
-        self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(seen))
-        if walked and seen.stood_s >= p.stand_s and (moved := self._moved(recording)):
+        stood = self.view.stood_s if walked and not standing.stood_s else standing.stood_s
+        self._walked, previous = walked, self._walked
+        self.view = replace(self.view, stood_s=stood, walked_s=walked, checks=self._checks(standing))
+        if walked and standing.stood_s >= p.stand_s and (moved := self._moved(recording)):
             message = Message(
                 "{moved}: the sensor has moved since the last quiet standing. The walk so far is discarded; "
                 "this quiet standing is used.",
                 moved=", ".join(moved),
             )
-            self._stand(recording, seen)
+            self._stand(recording, standing)
             self.view = replace(self.view, problem=Notice("sensor_moved", message, moved[0]))
             return None
         if not walked:
             self._attempt.keep_last(round(p.kept_s * rate))
-            if seen.longest_s < p.stand_s:
+            if standing.longest_s < p.stand_s:
                 self.stage = "stand"
             return None
         # swings and bows are looked at when they end
-        look = not ongoing and (walked > before or before_ongoing)
-        found = self._calibration(recording) if walked >= p.first_look_s and look else None
-        if found is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
+        look = not ongoing and (walked > previous or before_ongoing)
+        completed = self._calibration(recording) if walked >= p.first_look_s and look else None
+        if completed is None and self.stage == "walk" and len(self._attempt) >= p.longest_s * rate:
             message = Message(
                 "Only {walked:.0f} s of walking in {longest_s:.0f} s; {walk_s:.0f} s or {steps} straight "
                 "steps are needed. Stand still again, then walk straight ahead.",
@@ -228,7 +230,7 @@ class LiveCalibrator:
                 steps=p.steps,
             )
             self._restart(Notice("walk_too_short", message))
-        return found
+        return completed
 
     def _moved(self, recording: UniformRecording) -> list[Segment]:
         """Segments whose sensor has rotated relative to the vertical since the standing that began the
@@ -247,25 +249,25 @@ class LiveCalibrator:
         late = self.view.walked_s >= p.walk_s and not self._functional
         try:
             calibrated = calibrate(recording, p.mounting.calibration)
-            found = calibrated.calibration
-            steps = found.straight_steps or 0
+            details = calibrated.calibration
+            steps = details.straight_steps or 0
             self.view = replace(self.view, steps=steps)
-            if found.posture != "standing":
+            if details.posture != "standing":
                 raise SignalError(
                     "not_still",
                     "A sensor moved slowly or one foot was in front during quiet standing. Stand still "
                     "for 3 s with both feet side by side, then walk straight ahead.",
                 )
             least = p.least_steps if late else p.steps
-            if found.straight_steps is None and late:
+            if details.straight_steps is None and late:
                 least = 0  # a trunk sensor shows none
-            if all(x.method in FUNCTIONAL for x in found.segments.values()):
-                least = 0 if all(_is_enough(x) for x in found.diagnostics.values()) else steps + 1
-            if steps < least or len(found.segments) < len(recording.sensors):
+            if all(x.method in FUNCTIONAL for x in details.segments.values()):
+                least = 0 if all(_is_enough(x) for x in details.diagnostics.values()) else steps + 1
+            if steps < least or len(details.segments) < len(recording.sensors):
                 if late:
-                    self._restart(_why(found, steps, p))
+                    self._restart(_why(details, steps, p))
                 return None
-            made = finish_calibration(
+            finished = finish_calibration(
                 calibrated, self._attempt.first, self.wearer.segments, p.mounting, self._out
             )
         except SagittalError as error:
@@ -274,11 +276,13 @@ class LiveCalibrator:
             return None
         self.stage = "running"
         self._attempt = CalibrationSamples(self.wearer, self._length)
-        self.view = replace(self.view, checks=made.checks, ok=made.ok, problem=None, score=made.score)
-        return made
+        self.view = replace(
+            self.view, checks=finished.checks, ok=finished.ok, problem=None, score=finished.score
+        )
+        return finished
 
-    def _checks(self, seen: StandingNow) -> tuple[SegmentCheck, ...]:
-        return tuple(SegmentCheck(s, s in seen.still) for s in self.wearer.segments)
+    def _checks(self, standing: StandingNow) -> tuple[SegmentCheck, ...]:
+        return tuple(SegmentCheck(s, s in standing.still) for s in self.wearer.segments)
 
 
 def _is_enough(facts: object) -> bool:
@@ -286,11 +290,13 @@ def _is_enough(facts: object) -> bool:
     return isinstance(facts, Mapping) and facts["repetitions"] >= facts["asked"]
 
 
-def _why(found: Calibration, steps: int, params: CalibratingParams) -> Notice:
+def _why(calibration: Calibration, steps: int, params: CalibratingParams) -> Notice:
     """Why a calibration from this much walking is rejected."""
-    unknown = (n for n in found.notices if n.sensor is not None and n.sensor not in found.segments)
-    if (told := next(unknown, None)) is not None:
-        return told
+    unknown = (
+        n for n in calibration.notices if n.sensor is not None and n.sensor not in calibration.segments
+    )
+    if (notice := next(unknown, None)) is not None:
+        return notice
     message = Message(
         "{walk_s:.0f} s of movement contained about {steps} straight "
         f"{plural(steps, 'step', 'steps')}; {{least_steps}} are needed. Stand still again, "

@@ -125,8 +125,8 @@ class LiveChain:
         self._foot_mounts = [mounted[f] for f in feet]
         self._courses = tuple(s for s in COURSES if s in self.segments)
         self._course_columns = np.array([self.segments.index(s) for s in self._courses], np.int64)
-        alone, figure = self.estimator.attitudes, self.estimator.segments
-        self._figured = [None if s in alone else figure.index(s) for s in self._courses]
+        single_sensor, figure = self.estimator.attitudes, self.estimator.segments
+        self._figured = [None if s in single_sensor else figure.index(s) for s in self._courses]
         # a pelvis that carries a sensor tilts as that says, not as a model of the legs wants it
         self._tilting = tuple(s for s in self.estimator.attitudes if s == "pelvis")
         self._angles = AngleKernel.between(self._tilting, self.estimator.segments)
@@ -175,10 +175,10 @@ class LiveChain:
 
         best = next(iter(list_possible_estimators(self.segments)), None)
         if best == ERKF.name:
-            worn = tuple(s for s in WHOLE if s in column)
-            return LinkedBody(worn, filtered(worn), body.ankle_height, rate)
-        alone = list_worn_feet(self.segments)
-        feet = FootPaths(filtered(alone)) if alone else None
+            instrumented = tuple(s for s in WHOLE if s in column)
+            return LinkedBody(instrumented, filtered(instrumented), body.ankle_height, rate)
+        feet_segments = list_worn_feet(self.segments)
+        feet = FootPaths(filtered(feet_segments)) if feet_segments else None
         if best in (L7S_3I.name, L7S_2I.name) and feet is not None:
             return LiveL7s(column, mounted, body, rate, feet, self.params.l7s)
         message = Message(NOT_LIVE, sensors=", ".join(self.segments))
@@ -210,11 +210,11 @@ class LiveChain:
         gyr = np.stack([signals[s].gyr for s in self.segments], axis=1)
         valid = np.stack([signals[s].valid for s in self.segments], axis=1)
         filled = np.stack([signals[s].interpolated for s in self.segments], axis=1)
-        found = [self._advance(acc[zero], gyr[zero], valid[zero], filled[zero])]
+        outputs = [self._advance(acc[zero], gyr[zero], valid[zero], filled[zero])]
         for start in range(zero.stop, len(acc), MOST):
             k = slice(start, start + MOST)
-            found.append(self._advance(acc[k], gyr[k], valid[k], filled[k]))
-        return _joined(found)
+            outputs.append(self._advance(acc[k], gyr[k], valid[k], filled[k]))
+        return _joined(outputs)
 
     def _advance(self, acc: Floats, gyr: Floats, valid: Bools, filled: Bools) -> ChainOutput:
         if len(acc) > MOST and self._count:
@@ -235,10 +235,10 @@ class LiveChain:
         ]
         # a foot whose orientation is not known has no contacts
         sure = np.ascontiguousarray(sure[:, : len(self._feet)])
-        known = self._contacts.push(q[:, : len(self._feet)], sure, motions, self.first)
+        contacts = self._contacts.push(q[:, : len(self._feet)], sure, motions, self.first)
         self._remember(placed, turned, valid, sure, angles)
         self._count += len(acc)
-        for x in known:
+        for x in contacts:
             if x.event.first_s is None:
                 self.contact[x.event.side] = x.event.kind == "ic"
         self._notices += self.estimator.drain_notices()
@@ -246,17 +246,17 @@ class LiveChain:
             self._told_broken = True
             self._notices.append(Notice("live_figure_lost", BROKEN))
         notices, self._notices = tuple(self._notices), []
-        strides = tuple(self._strides.push(known, self.history))
-        return ChainOutput(placed, angles, tuple(x.event for x in known), strides, notices)
+        strides = tuple(self._strides.push(contacts, self.history))
+        return ChainOutput(placed, angles, tuple(x.event for x in contacts), strides, notices)
 
     def _measure(self, placed: BodyBlock, turned: Mapping[Segment, Floats], valid: Bools) -> Floats:
         """Angles (T, names) relative to standing; the first block is the standing period."""
-        q, known = placed.q, placed.known
+        q, is_known = placed.q, placed.known
         if self._tilting:
-            here = self.segments.index("pelvis")
+            pelvis_column = self.segments.index("pelvis")
             q = np.concatenate((turned["pelvis"][:, None], q), axis=1)
-            known = np.concatenate((valid[:, here, None], known), axis=1)
-        angles = self._angles.measure(q, known, self._zero)
+            is_known = np.concatenate((valid[:, pelvis_column, None], is_known), axis=1)
+        angles = self._angles.measure(q, is_known, self._zero)
         if self._zero is None:
             self._zero = mean_angles(angles)
             angles = subtract_zero(angles, self._zero)

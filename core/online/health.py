@@ -83,18 +83,18 @@ class _StreamHealth:
         """Health of the sensors of the stream."""
         span_s = 1e-6 * (self._pieces[-1].end_us - self._pieces[0].start_us) if self._pieces else 1.0
         totals = self._total.tolist()
-        said = span_s, totals, silent_s, list(still), list(stuck), dict(doubts)
-        if said == self._said:
+        inputs = span_s, totals, silent_s, list(still), list(stuck), dict(doubts)
+        if inputs == self._said:
             return self._found
         expected = max(1.0, span_s * self.info.rate_hz)
-        found = []
+        health_rows = []
         for i, (measured, full) in enumerate(totals):
             sensor = self.info.sensors[i]
             segment = sensor.segment
             doubt = None if segment is None else doubts.get(segment)
             now = span_s, measured, full, silent_s, segment in still, segment in stuck, doubt
-            before = self._told[i]
-            if before is None or before[0] != now:
+            cached = self._told[i]
+            if cached is None or cached[0] != now:
                 health = SensorHealth(
                     id=sensor.id,
                     segment=segment,
@@ -106,10 +106,10 @@ class _StreamHealth:
                     stuck=segment in stuck,
                     doubt=doubt,
                 )
-                self._told[i] = before = now, health
-            found.append(before[1])
-        self._said, self._found = said, found
-        return found
+                self._told[i] = cached = now, health
+            health_rows.append(cached[1])
+        self._said, self._found = inputs, health_rows
+        return health_rows
 
 
 class SensorHealthMonitor:
@@ -140,9 +140,9 @@ class SensorHealthMonitor:
         still : segments at rest. stuck : those that do not measure. doubts : segment → code of an
             inconsistency.
         """
-        found: list[SensorHealth] = []
+        health: list[SensorHealth] = []
         for stream in self._streams.values():
             since = stream.sent_us if stream.sent_us is not None else self._begun_us
             silent_s = 0.0 if since is None else 1e-6 * (self._now_us - since)
-            found += stream.read_health(silent_s, still, stuck, doubts or {})
-        return tuple(found)
+            health += stream.read_health(silent_s, still, stuck, doubts or {})
+        return tuple(health)

@@ -110,11 +110,11 @@ class OnlineSession:
         start = 0
         if self.chain is None:
             start = len(block)
-            found = self._calibrating.push(block)
-            if found is not None:
-                notices += found.notices
-                start = found.past - block.first
-                outcomes += self._begin(found, notices)
+            completed = self._calibrating.push(block)
+            if completed is not None:
+                notices += completed.notices
+                start = completed.past - block.first
+                outcomes += self._begin(completed, notices)
         self._agreement.push(block, self._calibrating.drain_standings())
         if self.chain is not None and start < len(block):
             k = slice(start, None)
@@ -125,15 +125,15 @@ class OnlineSession:
             strides = [s for x in outcomes for s in x.strides]
             self._guided.push(block, strides, [e for x in outcomes for e in x.events])
         resting = [s for s, x in zip(self.segments, rests.tolist(), strict=True) if x]
-        told = {} if self.chain is None or not outcomes else _tell(block, self.chain, outcomes)
+        frame_fields = {} if self.chain is None or not outcomes else _tell(block, self.chain, outcomes)
         return LiveFrame(
             t_s=float(block.t_s[-1]),
             seq=batch.seq,
             stage=self._calibrating.stage,
             health=self._health.read_health(resting, self._stuck.now, self._agreement.doubts),
             calibration=self._calibrating.view,
-            notices=(*notices, *(n for x in outcomes for n in x.notices)) if told else tuple(notices),
-            **told,
+            notices=(*notices, *(n for x in outcomes for n in x.notices)) if frame_fields else tuple(notices),
+            **frame_fields,
         )
 
     def compare_sensors(self) -> list[Notice]:
@@ -164,10 +164,10 @@ class OnlineSession:
             elif isinstance(value, Mapping):
                 self._guided.correct(GivenLimits(value["start_s"], value["end_s"]))
 
-    def _begin(self, found: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
+    def _begin(self, calibration: LiveCalibration, notices: list[Notice]) -> list[ChainOutput]:
         """Start the chain and catch up; calibration restarts if no chain can run with its result."""
         try:
-            self.chain = LiveChain(found, self.segments, self._surface, self.params.chain)
+            self.chain = LiveChain(calibration, self.segments, self._surface, self.params.chain)
         except SagittalError as error:
             notices.append(Notice(error.code, error.message, error.sensor))
             self._calibrating.redo()
@@ -178,19 +178,19 @@ class OnlineSession:
 def _tell(block: UniformBlock, chain: LiveChain, outcomes: Sequence[ChainOutput]) -> dict[str, Any]:
     """Content of a frame from the chain after the block's last sample."""
     placed, angles = outcomes[-1].placed, outcomes[-1].angles
-    here = min(len(angles), len(block))
+    count = min(len(angles), len(block))
     p = placed.p[-1]
-    told = zip(chain.estimator.segments, placed.known[-1].tolist(), strict=True)
-    known = [s if k else None for s, k in told]
-    there = zip(known, p, p[:, 0].tolist(), strict=True)
+    columns = zip(chain.estimator.segments, placed.known[-1].tolist(), strict=True)
+    segments_known = [s if k else None for s, k in columns]
+    positions = zip(segments_known, p, p[:, 0].tolist(), strict=True)
     return {
         "method": chain.estimator.method,
-        "q": {s: x for s, x in zip(known, placed.q[-1], strict=True) if s is not None},
-        "p": {s: x for s, x, first in there if s is not None and isfinite(first)},
+        "q": {s: x for s, x in zip(segments_known, placed.q[-1], strict=True) if s is not None},
+        "p": {s: x for s, x, first in positions if s is not None and isfinite(first)},
         "valid": bool(placed.whole[-1]),
         "contact": dict(chain.contact),
         "angles": dict(zip(chain.names, angles[-1].tolist(), strict=True)),
-        "trail": AngleTrail(block.t_s[-here:], chain.names, angles[-here:]) if here else EMPTY_TRAIL,
+        "trail": AngleTrail(block.t_s[-count:], chain.names, angles[-count:]) if count else EMPTY_TRAIL,
         "events": tuple(e for x in outcomes for e in x.events),
         "strides": tuple(s for x in outcomes for s in x.strides),
     }
@@ -204,32 +204,35 @@ def compile_live_kernels() -> None:
     compile_axis_kernels()
     compile_stuck_kernel()
     compile_live_agreement()
-    for worn in ("lower_body7", "feet_pelvis3", "feet2"):
-        _compile_chain(PRESETS[worn])
+    for preset in ("lower_body7", "feet_pelvis3", "feet2"):
+        _compile_chain(PRESETS[preset])
 
 
-def _compile_chain(worn: tuple[Segment, ...]) -> None:
-    chain = LiveChain(_standing(worn), worn)
-    acc = np.tile([0.0, GRAVITY, 0.0], (10, len(worn), 1))
-    here = np.ones(acc.shape[:2], np.bool_)
-    chain.push(acc, np.zeros_like(acc), here, ~here)
+def _compile_chain(segments: tuple[Segment, ...]) -> None:
+    chain = LiveChain(_standing(segments), segments)
+    acc = np.tile([0.0, GRAVITY, 0.0], (10, len(segments), 1))
+    is_valid = np.ones(acc.shape[:2], np.bool_)
+    chain.push(acc, np.zeros_like(acc), is_valid, ~is_valid)
 
 
-def _standing(worn: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:
+def _standing(segments: tuple[Segment, ...], samples: int = 150, rate_hz: float = 100.0) -> LiveCalibration:
     """Calibration of a simulated person in quiet standing, sensors aligned with the segments."""
     acc = np.tile([0.0, GRAVITY, 0.0], (samples, 1))
-    here = np.ones(samples, np.bool_)
-    sensors = {s: SensorSignals(s, acc.copy(), np.zeros_like(acc), None, here.copy(), ~here) for s in worn}
+    is_valid = np.ones(samples, np.bool_)
+    sensors = {
+        s: SensorSignals(s, acc.copy(), np.zeros_like(acc), None, is_valid.copy(), ~is_valid)
+        for s in segments
+    }
     t_s = np.arange(samples) / rate_hz
     zero = (0.0, samples / rate_hz)
     recording = UniformRecording(t_s, rate_hz, sensors, Subject(), "walk", {})
-    mounted = {s: SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0) for s in worn}
-    calibration = Calibration(mounted, (zero,), (), zero, ~here, "declared")
+    mounted = {s: SegmentCalibration(np.eye(3), np.zeros(3), GRAVITY, "declared", 1.0) for s in segments}
+    calibration = Calibration(mounted, (zero,), (), zero, ~is_valid, "declared")
     upright = np.tile(from_matrix(R_NEUTRAL), (samples, 1))
     return LiveCalibration(
         calibrated=CalibratedRecording(recording, calibration),
         orientations=Orientations(
-            t_s, rate_hz, dict.fromkeys(worn, upright), dict.fromkeys(worn, here), "declared"
+            t_s, rate_hz, dict.fromkeys(segments, upright), dict.fromkeys(segments, is_valid), "declared"
         ),
         first=0,
         past=samples,

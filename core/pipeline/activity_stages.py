@@ -32,19 +32,19 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
     ------
     SignalError : `no_trunk_sensor`.
     """
-    known = {s: d for d, s in recording.segments.items() if s is not None}
-    there = {**{d: as_long_stream(s) for d, s in recording.streams.items()}, **recording.long}
+    by_segment = {s: d for d, s in recording.segments.items() if s is not None}
+    available = {**{d: as_long_stream(s) for d, s in recording.streams.items()}, **recording.long}
     for segment in TRUNK:
-        if known.get(segment) in there:
-            return segment, there[known[segment]]
-    if len(there) == 1 and not known:
-        return "chest", next(iter(there.values()))
+        if by_segment.get(segment) in available:
+            return segment, available[by_segment[segment]]
+    if len(available) == 1 and not by_segment:
+        return "chest", next(iter(available.values()))
     raise SignalError(
         "no_trunk_sensor",
         Message(
             "Daily-life analysis requires a sensor on the chest or lower back. Assign the sensor that "
             "was worn there (sensors in the recording: {there}).",
-            there=", ".join(there),
+            there=", ".join(available),
         ),
     )
 
@@ -52,44 +52,44 @@ def find_trunk_stream(recording: Recording) -> tuple[Segment, LongStream]:
 def watch_activity(analysis: TakeAnalysis, config: PipelineConfig, tell: Progress) -> TakeAnalysis:
     """Daily-life activities; `tell` reports progress."""
     segment, stream = find_trunk_stream(analysis.source)
-    found = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity, tell)
-    return replace(analysis, activity=found)
+    monitored = monitor_activity(stream, segment, analysis.source.subject.height_m, config.activity, tell)
+    return replace(analysis, activity=monitored)
 
 
 def judge_activity(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Quality from the fraction of the recording with known posture; signal errors have stopped it before."""
-    found = analysis.activity
-    if found is None:
+    monitored = analysis.activity
+    if monitored is None:
         level: Level = "poor"
         report = QualityReport(level, ("The sensor provided no usable data.",), 0.0, 0.0, {}, (), ())
         return replace(analysis, report=report)
-    reasons = list_doubts(found)
-    level = "good" if not reasons else "usable" if share_known(found) >= WORN_SHARE else "poor"
-    notices = tuple(n for n in found.notices if n.severity != "info")
-    report = QualityReport(level, reasons, found.duration_s, found.rate_hz, {}, (), notices)
+    reasons = list_doubts(monitored)
+    level = "good" if not reasons else "usable" if share_known(monitored) >= WORN_SHARE else "poor"
+    notices = tuple(n for n in monitored.notices if n.severity != "info")
+    report = QualityReport(level, reasons, monitored.duration_s, monitored.rate_hz, {}, (), notices)
     return replace(analysis, report=report)
 
 
-def share_known(found: ActivityResult) -> float:
+def share_known(activity: ActivityResult) -> float:
     """Fraction of the wear time with known posture, 0 to 1."""
-    worn = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap"))
-    known = sum(s.duration_s for s in found.spans if s.kind not in ("non_wear", "gap", "unknown"))
-    return known / worn if worn > 0.0 else 0.0
+    worn_s = sum(s.duration_s for s in activity.spans if s.kind not in ("non_wear", "gap"))
+    known_s = sum(s.duration_s for s in activity.spans if s.kind not in ("non_wear", "gap", "unknown"))
+    return known_s / worn_s if worn_s > 0.0 else 0.0
 
 
-def list_doubts(found: ActivityResult) -> tuple[str, ...]:
+def list_doubts(activity: ActivityResult) -> tuple[str, ...]:
     """Why the level is not good, as sentences."""
     doubts: list[str] = []
-    total = max(found.duration_s, 1e-9)
-    unknown = 1.0 - share_known(found)
+    total = max(activity.duration_s, 1e-9)
+    unknown = 1.0 - share_known(activity)
     if unknown > 0.1:
         doubts.append(
             Message("Posture is unknown for {unknown:.0f} % of the wear time.", unknown=100 * unknown)
         )
-    lost = 60.0 * found.minutes("gap") / total
+    lost = 60.0 * activity.minutes("gap") / total
     if lost > 0.1:
         doubts.append(Message("No data for {lost:.0f} % of the time.", lost=100 * lost))
-    if any(n.code in ("no_baseline", "baseline_assumed") for n in found.notices):
+    if any(n.code in ("no_baseline", "baseline_assumed") for n in activity.notices):
         doubts.append("Without walking, the vertical is uncertain.")
     return tuple(doubts)
 

@@ -181,10 +181,10 @@ class TakeAnalysis:
             self.orientations, detected, self.measured, self.poses, self.angles, self.functional,
             self.activity,
         )  # fmt: skip
-        found = [notice for part in speaking if part is not None for notice in part.notices]
-        found += () if self.mounted is None else self.mounted.assumed
-        found += () if self.problem is None else (self.problem,)
-        return tuple(dict.fromkeys(found))
+        all_notices = [notice for part in speaking if part is not None for notice in part.notices]
+        all_notices += () if self.mounted is None else self.mounted.assumed
+        all_notices += () if self.problem is None else (self.problem,)
+        return tuple(dict.fromkeys(all_notices))
 
     @property
     def provenance(self) -> Mapping[str, object]:

@@ -21,12 +21,12 @@ def measure_trunk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAn
     working, protocol = drop_stuck_sensors(analysis.recording), analysis.source.protocol
     limits, params = analysis.source.test_limits, config.functional
     if protocol == "tug":
-        found = measure_tug(follow_trunk(working), limits, params.rising, config.turns)
+        test = measure_tug(follow_trunk(working), limits, params.rising, config.turns)
     elif protocol == "five_sit_to_stand":
-        found = measure_chair_rises(follow_trunk(working), limits, params.rising)
+        test = measure_chair_rises(follow_trunk(working), limits, params.rising)
     else:
-        found = measure_sway(working, limits, params.sway)
-    return replace(analysis, functional=found)
+        test = measure_sway(working, limits, params.sway)
+    return replace(analysis, functional=test)
 
 
 def measure_walk_test(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

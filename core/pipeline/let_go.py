@@ -25,8 +25,8 @@ def forget_magnetometers(analysis: TakeAnalysis) -> TakeAnalysis:
         analysis = replace(analysis, uniform=_without_magnetometers(uniform))
     if agreed is not None:
         whole = None if agreed.whole is None else _without_magnetometers(agreed.whole)
-        kept = replace(agreed, recording=_without_magnetometers(agreed.recording), whole=whole)
-        analysis = replace(analysis, agreed=kept)
+        reduced = replace(agreed, recording=_without_magnetometers(agreed.recording), whole=whole)
+        analysis = replace(analysis, agreed=reduced)
     return analysis
 
 
@@ -60,9 +60,9 @@ def keep_what_is_measured(analysis: TakeAnalysis) -> TakeAnalysis:
     poses in the precision of the file.
     """
     mounted, posed = require_stage(analysis.mounted, "mounting"), require_stage(analysis.posed, "poses")
-    kept = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
-    orientations, poses = replace(posed.orientations, q=kept), posed.poses
+    retained = {s: q for s, q in posed.orientations.q.items() if s in (*FOOT.values(), *TRUNK)}
+    orientations, poses = replace(posed.orientations, q=retained), posed.poses
     kind = figure_precision(len(poses.t_s))
-    turned = {s: q if s in kept else np.asarray(q, kind) for s, q in poses.q.items()}
+    turned = {s: q if s in retained else np.asarray(q, kind) for s, q in poses.q.items()}
     posed = replace(posed, orientations=orientations, poses=replace(poses, q=turned))
     return replace(analysis, mounted=replace(mounted, orientations=orientations), posed=posed)

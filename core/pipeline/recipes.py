@@ -104,8 +104,8 @@ def choose_recipe(analysis: TakeAnalysis) -> tuple[PipelineStage, ...]:
         return SQUAT
     if analysis.source.protocol in TRUNK_TESTS:
         return BY_TRUNK
-    alone = all(s in TRUNK for s in drop_stuck_sensors(analysis.recording).sensors)
-    walk = TRUNK_ONLY if alone else WALK
+    trunk_only = all(s in TRUNK for s in drop_stuck_sensors(analysis.recording).sensors)
+    walk = TRUNK_ONLY if trunk_only else WALK
     return (*walk, WALK_TEST) if analysis.source.protocol in WALK_TESTS else walk
 
 
@@ -123,7 +123,7 @@ def run_stages(
             continue
         progress(stage.name, stage.share)
         end = stages[i + 1].share if i + 1 < len(stages) else 1.0
-        before = analysis.problem
+        previous = analysis.problem
         try:
             if stage.tells_share:
                 analysis = stage.run(analysis, analysis.config, _tell_within(stage, end, progress))
@@ -136,7 +136,7 @@ def run_stages(
                 raise
             problem = Notice(error.code, error.message, error.sensor, error.t_s, severity="error")
             analysis = replace(analysis, problem=problem)
-        if analysis.problem is not before and analysis.problem is not None:
+        if analysis.problem is not previous and analysis.problem is not None:
             analysis = replace(analysis, stopped_at=stage.name)
     return analysis
 
@@ -177,9 +177,9 @@ def resume(
             Message("No stage '{stage}'; expected one of {names}.", stage=stage, names=", ".join(names)),
         )
     first = names.index(stage)
-    before, again = recipe[:first], recipe[first:]
-    missing = [s.name for s in before if any(getattr(analysis, name) is None for name in s.results)]
-    if missing and not again[0].runs_after_problem:
+    earlier, repeated = recipe[:first], recipe[first:]
+    missing = [s.name for s in earlier if any(getattr(analysis, name) is None for name in s.results)]
+    if missing and not repeated[0].runs_after_problem:
         raise ParameterError(
             "stage_not_reached",
             Message(
@@ -189,7 +189,7 @@ def resume(
             ),
         )
     changed = [
-        name for s in before for name in s.reads if getattr(config, name) != getattr(analysis.config, name)
+        name for s in earlier for name in s.reads if getattr(config, name) != getattr(analysis.config, name)
     ]
     if changed:
         raise ParameterError(
@@ -200,7 +200,7 @@ def resume(
                 stage=stage,
             ),
         )
-    forgotten: dict[str, Any] = dict.fromkeys(name for s in again for name in s.results)
+    forgotten: dict[str, Any] = dict.fromkeys(name for s in repeated for name in s.results)
     if analysis.stopped_at in names[first:]:
         forgotten |= {"problem": None, "stopped_at": None}
     return _run_from(replace(analysis, config=config, **forgotten), first, progress)
@@ -214,7 +214,7 @@ def _run_from(
         analysis = run_stages(analysis, ACTIVITY[first:], progress)
     else:
         analysis = run_stages(analysis, SIGNALS[first:], progress, resumable=resumable)
-        rest = choose_recipe(analysis)[max(first, len(SIGNALS)) :]
-        analysis = run_stages(analysis, rest, progress, resumable=resumable)
+        remaining = choose_recipe(analysis)[max(first, len(SIGNALS)) :]
+        analysis = run_stages(analysis, remaining, progress, resumable=resumable)
     progress("done", 1.0)
     return analysis

@@ -48,22 +48,22 @@ NO_HEIGHT: Final = Notice(
 def calibrate_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
     """Alignment by the fixed offset or from the table, biases and zero from standing."""
     working = drop_stuck_sensors(analysis.recording)
-    sides, rest = find_squat_sides(working), config.calibration.rest
+    sides, rest_params = find_squat_sides(working), config.calibration.rest
     if config.squat.mounting == "table_top":
-        worn = {s: working.sensors[s] for side in sides for s in leg_segments(side)}
-        taken = replace(require_stage(analysis.uniform, "timeline"), sensors=worn)
-        standing = find_worn_standing(taken, config.squat.table_top)
-        found = calibrate_table_top(crop(taken, standing[1]), config.squat.table_top)
-        told = found.notices
+        leg_sensors = {s: working.sensors[s] for side in sides for s in leg_segments(side)}
+        on_table = replace(require_stage(analysis.uniform, "timeline"), sensors=leg_sensors)
+        standing = find_worn_standing(on_table, config.squat.table_top)
+        table_mounts = calibrate_table_top(crop(on_table, standing[1]), config.squat.table_top)
+        alignment_notices = table_mounts.notices
         calibrated = calibrate_with_mounts(
-            working, found.R_segment_sensor, "table_top", TABLE_TOP, rest, standing[0]
+            working, table_mounts.R_segment_sensor, "table_top", TABLE_TOP, rest_params, standing[0]
         )
     else:
-        told = (AGREED,)
+        alignment_notices = (AGREED,)
         mounts = make_fixed_mounts(*sides)
-        calibrated = calibrate_with_mounts(working, mounts, "fixed_offset", FIXED_OFFSET, rest)
+        calibrated = calibrate_with_mounts(working, mounts, "fixed_offset", FIXED_OFFSET, rest_params)
     assumed = () if analysis.recording.subject.height_m is not None else (NO_HEIGHT,)
-    calibration = replace(calibrated.calibration, notices=(*told, *assumed))
+    calibration = replace(calibrated.calibration, notices=(*alignment_notices, *assumed))
     calibrated = replace(calibrated, calibration=calibration)
     legs_alone = replace(working, sensors={s: working.sensors[s] for s in calibration.segments})
     score = score_calibration(
@@ -92,18 +92,18 @@ def compute_squat_angles(analysis: TakeAnalysis, config: PipelineConfig) -> Take
     zero = require_stage(analysis.calibrated, "calibration").calibration.zero
     standing = analysis.recording.subject.standing_angles_deg
     joined = measure_angles(posed.orientations, zero, standing_deg=standing)
-    found, offset = dict(joined.angles), dict(joined.zero_offset)
+    merged, offset = dict(joined.angles), dict(joined.zero_offset)
     notices = joined.notices
     if len(legs) > 1:
         # the shared pelvis is a mean: hips are measured against that of their own chain
         own = {side: measure_angles(leg.orientations, zero) for side, leg in legs.items()}
         for side, of_leg in own.items():
             hip = [n for n in of_leg.angles if n.startswith("hip_") and n.endswith(f"_{SUFFIX[side]}")]
-            found |= {name: of_leg.angles[name] for name in hip}
+            merged |= {name: of_leg.angles[name] for name in hip}
             offset |= {name: of_leg.zero_offset[name] for name in hip}
         notices = tuple(dict.fromkeys((*notices, *(n for a in own.values() for n in a.notices))))
-    told = tuple(n for n in notices if n.code != "joint_missing")
-    return replace(analysis, angles=replace(joined, angles=found, zero_offset=offset, notices=told))
+    other_notices = tuple(n for n in notices if n.code != "joint_missing")
+    return replace(analysis, angles=replace(joined, angles=merged, zero_offset=offset, notices=other_notices))
 
 
 def measure_squat(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:

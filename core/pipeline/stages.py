@@ -106,8 +106,8 @@ def compare_clocks(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
         agreed = Agreement(uniform)
     if setup is None:
         return replace(analysis, setup=None, agreed=agreed)
-    told = setup.tell("error" if setup.is_sure and config.setup.refuse else "warning")
-    spoken = replace(agreed.recording, notices=(*agreed.recording.notices, told))
+    notice = setup.tell("error" if setup.is_sure and config.setup.refuse else "warning")
+    spoken = replace(agreed.recording, notices=(*agreed.recording.notices, notice))
     return replace(analysis, setup=setup, agreed=replace(agreed, recording=spoken))
 
 
@@ -156,13 +156,13 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
     calibrated = require_stage(analysis.calibrated, "calibration")
     events = _contacts(fused, calibrated, config)
     if not set(uniform.sensors) >= CHAIN:
-        told = tell_foot_lag(events, config.alternation)
-        events = replace(events, notices=(*events.notices, *told)) if told else events
-    alone = not events.events and trunk_sensor(uniform) is not None
+        lag_notices = tell_foot_lag(events, config.alternation)
+        events = replace(events, notices=(*events.notices, *lag_notices)) if lag_notices else events
+    trunk_alone = not events.events and trunk_sensor(uniform) is not None
     contacts = DetectedContacts(
         events,
         find_turns(*body_yaw_rate(fused, uniform.rate_hz), uniform.rate_hz, config.turns),
-        detect_steps(uniform, config.lumbar) if alone else None,
+        detect_steps(uniform, config.lumbar) if trunk_alone else None,
     )
     return replace(analysis, contacts=contacts)
 
@@ -170,8 +170,8 @@ def detect_contacts(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnaly
 def _fall_back_on_trunk(analysis: TakeAnalysis) -> TakeAnalysis:
     """The analysis with the steps of its trunk sensor, noting what stopped the calibration."""
     contacts, problem = require_stage(analysis.contacts, "events"), analysis.problem
-    told = () if problem is None else (replace(problem, severity="warning"),)
-    events = replace(contacts.events, notices=(*told, Notice("trunk_alone", TRUNK_ALONE)))
+    cause = () if problem is None else (replace(problem, severity="warning"),)
+    events = replace(contacts.events, notices=(*cause, Notice("trunk_alone", TRUNK_ALONE)))
     return replace(analysis, contacts=replace(contacts, events=events))
 
 
@@ -181,8 +181,8 @@ def detect_trunk_steps(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAn
     steps = detect_steps(uniform, config.lumbar)
     signals = uniform.sensors[steps.source]
     _, yaw_rate = split_about_vertical(signals, uniform.rate_hz, config.lumbar)
-    found = find_turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns)
-    return replace(analysis, contacts=DetectedContacts(GaitEvents(()), found, steps))
+    detected_turns = find_turns(yaw_rate, signals.valid, uniform.rate_hz, config.turns)
+    return replace(analysis, contacts=DetectedContacts(GaitEvents(()), detected_turns, steps))
 
 
 def mount_on_segments(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -214,9 +214,9 @@ def compute_angles(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalys
     joint = measure_angles(
         posed.orientations, calibration.zero, posed.poses, standing, calibration.posture, fixed
     )
-    shown = withhold(joint, posed.poses, posed.orientations)
+    reliable = withhold(joint, posed.poses, posed.orientations)
     doubtful = {} if analysis.agreed is None else analysis.agreed.doubtful
-    return replace(analysis, angles=withhold_at_slips(shown, doubtful) if doubtful else shown)
+    return replace(analysis, angles=withhold_at_slips(reliable, doubtful) if doubtful else reliable)
 
 
 def measure_walk(analysis: TakeAnalysis, config: PipelineConfig) -> TakeAnalysis:
@@ -300,19 +300,19 @@ def _contacts(
     if config.detector != "foot_pitch":
         motions = measure_foot_movements(calibrated)
         refined = detect_foot_contacts(orientations, config.events, config.contacts, motions)
-    found = all_detectors(orientations, config.events, config.consensus, refined)
+    detected = all_detectors(orientations, config.events, config.consensus, refined)
     feet = any(s in orientations.q for s in FOOT.values())
     agree = rate_confidence if feet and config.detector != "consensus" else agree_on_contacts
-    return agree(found, config.consensus)
+    return agree(detected, config.consensus)
 
 
 def _standing(analysis: TakeAnalysis) -> tuple[Window, ...]:
     """Windows without movement of the feet; of shanks without foot sensors, else thighs."""
     working = drop_stuck_sensors(analysis.recording)
     for level in (FOOT, SHANK, THIGH):
-        worn = [s for s in level.values() if s in working.sensors]
-        if worn:
-            return find_rest_windows(working, STANDING, worn)
+        instrumented = [s for s in level.values() if s in working.sensors]
+        if instrumented:
+            return find_rest_windows(working, STANDING, instrumented)
     return ()
 
 
@@ -331,13 +331,13 @@ def _trunk_acceleration(analysis: TakeAnalysis, config: PipelineConfig) -> dict[
     if mounted is None or posed is None:
         return {}
     orientations = posed.orientations
-    worn, mounts = mounted.calibrated.recording.sensors, mounted.calibrated.calibration.segments
+    signals, mounts = mounted.calibrated.recording.sensors, mounted.calibrated.calibration.segments
     uniform = drop_stuck_sensors(analysis.recording)
     return {
         s: np.where(
             orientations.valid[s][:, None],
             in_walking_frame(
-                remove_gravity(worn[s].acc, worn[s].valid, orientations.q[s], mounts[s]),
+                remove_gravity(signals[s].acc, signals[s].valid, orientations.q[s], mounts[s]),
                 orientations.q[s],
                 analysis.recording.rate_hz,
             ),

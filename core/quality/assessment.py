@@ -166,10 +166,10 @@ def assess(
         for rest detection. None = all.
     """
     params = params or QualityParams()
-    rest = find_rest_windows(uniform, params.rest, working)
+    rests = find_rest_windows(uniform, params.rest, working)
     sensors: dict[Segment, SensorQuality] = {}
     notices: list[Notice] = [n for n in (*recording.notices, *uniform.notices) if n.severity == "error"]
-    if not rest:
+    if not rests:
         notices.append(
             Notice(
                 "no_rest",
@@ -179,10 +179,10 @@ def assess(
             )
         )
     for segment, signals in uniform.sensors.items():
-        quality, found = _sensor(segment, signals, recording, uniform, rest, params)
+        quality, new_notices = _sensor(segment, signals, recording, uniform, rests, params)
         sensors[segment] = quality
         # of one that does not measure no unit, range or hole need be told beside that
-        notices += found if working is None or segment in working else []
+        notices += new_notices if working is None or segment in working else []
     notices += _copies(recording)
     level, reasons = _level(sensors, [*uniform.notices, *notices], params)
     return QualityReport(
@@ -191,7 +191,7 @@ def assess(
         duration_s=len(uniform.t_s) / uniform.rate_hz,
         rate_hz=uniform.rate_hz,
         sensors=MappingProxyType(sensors),
-        rest=rest,
+        rest=rests,
         notices=tuple(dict.fromkeys(notices)),
     )
 
@@ -201,7 +201,7 @@ def _sensor(
     signals: SensorSignals,
     recording: Recording,
     uniform: UniformRecording,
-    rest: tuple[Window, ...],
+    rests: tuple[Window, ...],
     params: QualityParams,
 ) -> tuple[SensorQuality, list[Notice]]:
     stream = recording.streams[signals.device_id]
@@ -209,7 +209,7 @@ def _sensor(
     notices = list_suspicions(signals.device_id, f, stream.acc, stream.quat)
     lost, longest = measure_losses(stream)
     gaps = find_runs(~signals.valid | signals.interpolated)
-    norm, bias = _measure_rest(signals, uniform, rest)
+    norm, bias = _measure_rest(signals, uniform, rests)
     invalid = float(np.mean(~signals.valid))
     notices += _gap_notice(segment, signals, uniform, invalid, params)
     acc_share, acc_top = saturation(stream.acc, params.acc_floor)
@@ -243,11 +243,11 @@ def _sensor(
 
 
 def _measure_rest(
-    signals: SensorSignals, uniform: UniformRecording, rest: tuple[Window, ...]
+    signals: SensorSignals, uniform: UniformRecording, rests: tuple[Window, ...]
 ) -> tuple[float | None, float | None]:
     """Norms of the specific force and of the mean rate at rest, None without rest."""
     at_rest = np.zeros(len(uniform.t_s), np.bool_)
-    for window in rest:
+    for window in rests:
         at_rest[index_window(window, uniform.rate_hz)] = True
     at_rest &= signals.valid
     if not at_rest.any():
@@ -309,7 +309,7 @@ def _gap_notice(
 
 
 def _saturated(
-    segment: Segment, what: str, share: float, top: float | None, unit: str, params: QualityParams
+    segment: Segment, device_part: str, share: float, top: float | None, unit: str, params: QualityParams
 ) -> list[Notice]:
     if top is None:
         return []
@@ -320,7 +320,7 @@ def _saturated(
                 "The {what} of {segment} stays at {top:.1f} {unit} in {share:.2f} % of the samples "
                 "(limit {saturated:.1f} %): its range is too small for this movement. Set a wider "
                 "range.",
-                what=what,
+                what=device_part,
                 segment=segment,
                 top=top,
                 unit=unit,
@@ -335,18 +335,18 @@ def _saturated(
 
 def _copies(recording: Recording) -> list[Notice]:
     """Notice on a stream with a second, unmapped id, which is not analysed."""
-    worn = {d for d, s in recording.segments.items() if s is not None}
+    mapped = {d for d, s in recording.segments.items() if s is not None}
     by_digest: dict[str, list[str]] = {}
     for device, stream in recording.streams.items():
         by_digest.setdefault(stream.digest, []).append(device)
-    found = []
+    notices = []
     for group in by_digest.values():
         if len(group) < 2:
             continue
-        used = [d for d in group if d in worn]
+        used = [d for d in group if d in mapped]
         device_id = used[0] if used else None
         ids = "”, “".join(group)
-        found.append(
+        notices.append(
             Notice(
                 "duplicate_stream",
                 Message(
@@ -365,7 +365,7 @@ def _copies(recording: Recording) -> list[Notice]:
                 severity="info",
             )
         )
-    return found
+    return notices
 
 
 def _level(

@@ -93,10 +93,10 @@ def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
     for a bias change combines `BIAS_MOVED`, twice the possible rotation of the wearer in both rests, and its
     own scatter.
     """
-    known = [i for i, check in enumerate(checks) if check.reason is None]
-    if not known:
+    measured = [i for i, check in enumerate(checks) if check.reason is None]
+    if not measured:
         return DeviceCourse(None, 0)
-    *earlier, last = known
+    *earlier, last = measured
     new = checks[last]
     assert new.gyro_bias is not None  # noqa: S101 (no reason: measured)
     assert new.gravity_scale is not None  # noqa: S101 (the same)
@@ -104,16 +104,18 @@ def follow_device(checks: Sequence[DeviceCheck]) -> DeviceCourse:
     off = abs(new.gravity_scale - 1.0)
     if off > SCALE_OFF:
         findings.append(DeviceFinding("scale_off", new.gravity_scale - 1.0, SCALE_OFF, None))
-    before = [checks[i] for i in earlier]
-    biases = [c.gyro_bias for c in before if c.gyro_bias is not None]
+    earlier_checks = [checks[i] for i in earlier]
+    biases = [c.gyro_bias for c in earlier_checks if c.gyro_bias is not None]
     usual, middle, limit = None, None, BIAS_MOVED
     if biases:
         usual = np.median(biases, axis=0)
-        unsure = 2.0 * ((new.bias_error or 0.0) + float(np.median([c.bias_error or 0.0 for c in before])))
-        away = [float(np.linalg.norm(b - usual)) for b in (*biases, new.gyro_bias)]
-        scatter = SCATTER * float(np.median(away[:-1]))
+        unsure = 2.0 * (
+            (new.bias_error or 0.0) + float(np.median([c.bias_error or 0.0 for c in earlier_checks]))
+        )
+        deviations = [float(np.linalg.norm(b - usual)) for b in (*biases, new.gyro_bias)]
+        scatter = SCATTER * float(np.median(deviations[:-1]))
         limit = max(BIAS_MOVED, unsure, scatter)
-        findings += _beyond("gyro_bias", away, limit, earlier)
+        findings += _beyond("gyro_bias", deviations, limit, earlier)
     lying = [i for i in earlier if _in_same_posture(checks[i], new)]
     scales = [checks[i].gravity_scale or 1.0 for i in lying]
     if scales:
@@ -133,13 +135,13 @@ def _louder(
     alike: Sequence[int],
     new: DeviceCheck,
 ) -> list[DeviceFinding]:
-    there = [i for i in alike if getattr(checks[i], quantity) is not None]
+    measured = [i for i in alike if getattr(checks[i], quantity) is not None]
     now = getattr(new, quantity)
-    if now is None or not there:
+    if now is None or not measured:
         return []
-    values = [float(getattr(checks[i], quantity)) for i in there]
+    values = [float(getattr(checks[i], quantity)) for i in measured]
     middle = float(np.median(values))
-    return _beyond(quantity, [x / middle for x in (*values, float(now))], limit, there)
+    return _beyond(quantity, [x / middle for x in (*values, float(now))], limit, measured)
 
 
 def _beyond(
@@ -150,8 +152,8 @@ def _beyond(
     """
     if abs(values[-1]) <= limit:
         return []
-    within = [i for i, value in zip(earlier, values, strict=False) if abs(value) <= limit]
-    return [DeviceFinding(quantity, values[-1], limit, within[-1] if within else None)]
+    inside = [i for i, value in zip(earlier, values, strict=False) if abs(value) <= limit]
+    return [DeviceFinding(quantity, values[-1], limit, inside[-1] if inside else None)]
 
 
 def _in_same_posture(a: DeviceCheck, b: DeviceCheck) -> bool:

@@ -93,13 +93,13 @@ class DeviceCheck:
         }
 
     @classmethod
-    def from_json(cls, said: Mapping[str, Any]) -> Self:
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
         """Parse a check written by `to_json`."""
-        known = {name: said[name] for name in cls.__dataclass_fields__}
+        values = {name: data[name] for name in cls.__dataclass_fields__}
         for name in ("gyro_bias", "up"):
-            known[name] = None if known[name] is None else np.asarray(known[name], np.float64)
-        known["rest_s"] = None if known["rest_s"] is None else tuple(known["rest_s"])
-        return cls(**known)
+            values[name] = None if values[name] is None else np.asarray(values[name], np.float64)
+        values["rest_s"] = None if values["rest_s"] is None else tuple(values["rest_s"])
+        return cls(**values)
 
 
 def is_serial(device_id: str) -> bool:
@@ -139,8 +139,8 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
     still = [r for r in rests if not is_drifting(signals, r, rate, params)]
     if not still:
         return DeviceCheck(stream.device_id, rate, reason="no_rest")
-    rest = max(still, key=lambda r: r[1] - r[0])
-    part = index_window(rest, rate)
+    window = max(still, key=lambda r: r[1] - r[0])
+    part = index_window(window, rate)
     acc, gyr = (signals.cut(name, part) for name in ("acc", "gyr"))
     mean = acc.mean(axis=0)
     norm = float(np.linalg.norm(mean))
@@ -149,7 +149,7 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
     return DeviceCheck(
         stream.device_id,
         rate,
-        rest_s=rest,
+        rest_s=window,
         gyro_bias=gyr.mean(axis=0),
         bias_error=max(measure_turn(acc, rate)[0], params.drift) * rate / len(acc),
         up=mean / norm,
@@ -161,8 +161,8 @@ def check_device(stream: ImuStream, params: RestParams | None = None) -> DeviceC
 
 def _held(stream: ImuStream) -> SensorSignals:
     """The stream's samples; missing ones are held and invalid, as are those next to a gap in time."""
-    there = [is_complete(stream.held(name)) for name in ("acc", "gyr")]
-    good = np.asarray(np.logical_and(*there), np.bool_)
+    complete = [is_complete(stream.held(name)) for name in ("acc", "gyr")]
+    good = np.asarray(np.logical_and(*complete), np.bool_)
     acc, rates = stream.held("acc"), stream.held("gyr")
     if not good.all():
         last = np.maximum.accumulate(np.where(good, np.arange(len(good)), 0))

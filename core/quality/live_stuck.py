@@ -33,13 +33,13 @@ class StuckSensors:
 
     def push(self, block: UniformBlock) -> tuple[UniformBlock, list[Notice]]:
         """Process the next samples; returns the block with invalid samples marked, and new notices."""
-        found = self._watch.push(block.acc, block.gyr, block.valid)
-        if found is None:
+        faults = self._watch.push(block.acc, block.gyr, block.valid)
+        if faults is None:
             self.now = ()
             none = np.zeros(block.valid.shape, np.bool_)
             x = block  # `replace` looks at every field, in every push
             return UniformBlock(x.first, x.t_s, x.acc, x.gyr, x.valid, x.interpolated, none), []
-        bad, back = found
+        bad, back = faults
         self.now = tuple(s for s, x in zip(self._segments, bad[-1], strict=True) if x)
         notices = []
         for k, i in np.argwhere(back > 0).tolist():

@@ -91,12 +91,12 @@ def _walk(acc: Floats, gyr: Floats, legs: Floats, rate_hz: float) -> _Walk | Non
     """Integrate from the last quiet second before the first step."""
     walking = smooth(legs, 1.0, rate_hz) > WALKING
     onset = int(np.argmax(walking))
-    rest = _rest_before(acc, onset, rate_hz)
-    if rest is None:
+    still_part = _rest_before(acc, onset, rate_hz)
+    if still_part is None:
         return None
-    bias = gyr[rest].mean(axis=0)
-    at_rest = acc[rest].mean(axis=0)
-    begin, end = rest.stop, min(len(acc), onset + round(INTEGRATE_S * rate_hz))
+    bias = gyr[still_part].mean(axis=0)
+    at_rest = acc[still_part].mean(axis=0)
+    begin, end = still_part.stop, min(len(acc), onset + round(INTEGRATE_S * rate_hz))
     q = _strapdown(gyr[begin:end] - bias, at_rest, rate_hz)
     world = rotation.rotate(q, acc[begin:end]) - [0.0, 0.0, np.linalg.norm(at_rest)]
     yaw_rate = rotation.rotate(q, gyr[begin:end] - bias)[:, 2]

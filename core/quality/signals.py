@@ -89,23 +89,23 @@ def measure_signal(acc: Floats, gyr: Floats | None, rate_hz: float) -> Facts:
     del a, row
     spread = np.sqrt(np.maximum(spread, 0.0))
     k = int(np.argmin(spread))
-    at = slice(k, k + width)
-    still_norm = float(norm[at].mean())
+    window = slice(k, k + width)
+    still_norm = float(norm[window].mean())
     calm = np.union1d([k], np.flatnonzero(spread < STILL * np.sqrt((mean**2).sum(axis=0))))
     still = bool(spread[k] < STILL * np.linalg.norm(mean[:, k]))
     del mean, spread
     speed = None if gyr is None else find_lengths(gyr)
     if gyr is not None:
         calm = _without_turns(gyr[good], calm, width)
-    known = None if speed is None else speed[np.isfinite(speed)]
+    finite = None if speed is None else speed[np.isfinite(speed)]
     return Facts(
         still=still,
         still_norm=still_norm,
         still_gyro=None if speed is None else _least(speed[good], calm, width),
-        still_slice=slice(int(good[at][0]), int(good[at][-1]) + 1),
+        still_slice=slice(int(good[window][0]), int(good[window][-1]) + 1),
         median_norm=float(np.median(norm)),
         acc_std=float(norm.std()),
-        gyro_top=None if known is None or not len(known) else float(np.percentile(known, 99.9)),
+        gyro_top=None if finite is None or not len(finite) else float(np.percentile(finite, 99.9)),
     )
 
 
@@ -129,9 +129,9 @@ def _without_turns(gyr: Floats, starts: NDArray[np.int64], width: int) -> NDArra
 
 def _least(speed: Floats, starts: NDArray[np.int64], width: int) -> float | None:
     """Minimum mean speed of the windows that begin at `starts`; missing samples are ignored."""
-    known = np.isfinite(speed)
-    total = np.concatenate(([0.0], np.cumsum(np.where(known, speed, 0.0))))
-    count = np.concatenate(([0], np.cumsum(known)))
+    is_finite = np.isfinite(speed)
+    total = np.concatenate(([0.0], np.cumsum(np.where(is_finite, speed, 0.0))))
+    count = np.concatenate(([0], np.cumsum(is_finite)))
     n = count[starts + width] - count[starts]
     if not n.any():
         return None
@@ -175,12 +175,12 @@ def magnetic_share(mag: Floats, still: slice, limit: float) -> float | None:
     None without a magnetometer reading at rest. Source: docs/science/quality.md, "Magnetic field".
     """
     norm = find_lengths(mag)
-    rest = norm[still]
-    rest = rest[np.isfinite(rest)]
-    known = norm[np.isfinite(norm)]
-    if not len(rest) or not len(known) or np.median(rest) <= 0:
+    rest_norms = norm[still]
+    rest_norms = rest_norms[np.isfinite(rest_norms)]
+    finite = norm[np.isfinite(norm)]
+    if not len(rest_norms) or not len(finite) or np.median(rest_norms) <= 0:
         return None
-    return float(np.mean(np.abs(known / np.median(rest) - 1.0) > limit))
+    return float(np.mean(np.abs(finite / np.median(rest_norms) - 1.0) > limit))
 
 
 def _moving_mean(x: Floats, width: int) -> Floats:

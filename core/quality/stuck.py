@@ -104,11 +104,11 @@ class StuckWatch:
         acc, gyr : (T, n, 3) m/s², rad/s. valid : (T, n); invalid samples are skipped.
         """
         bad, back = np.empty(valid.shape, np.int64), np.empty(valid.shape, np.int64)
-        found = stuck_kernel(
+        any_fault = stuck_kernel(
             np.ascontiguousarray(acc), np.ascontiguousarray(gyr), np.ascontiguousarray(valid),
             tuple(self._rule), self._full, tuple(self._state), bad, back,
         )  # fmt: skip
-        return (bad, back) if found else None
+        return (bad, back) if any_fault else None
 
     def describe(self, segment: Segment, sensor: int, kind: int, first_s: float) -> Notice:
         """Notice with the fault of a sensor and its start."""
@@ -202,26 +202,26 @@ def mark_stuck(recording: UniformRecording, params: StuckParams | None = None) -
     if not signals:
         return recording
     watch = StuckWatch(len(segments), recording.rate_hz, params)
-    found = [_look_at(watch, signals, slice(a, a + AT_ONCE)) for a in range(0, len(recording.t_s), AT_ONCE)]
-    if all(x is None for x in found):
+    blocks = [_look_at(watch, signals, slice(a, a + AT_ONCE)) for a in range(0, len(recording.t_s), AT_ONCE)]
+    if all(x is None for x in blocks):
         return recording
     lengths = [min(AT_ONCE, len(recording.t_s) - a) for a in range(0, len(recording.t_s), AT_ONCE)]
     nothing = [np.zeros((n, len(signals)), np.int64) for n in lengths]
     bad, back = (
-        np.concatenate([none if x is None else x[i] for x, none in zip(found, nothing, strict=True)])
+        np.concatenate([none if x is None else x[i] for x, none in zip(blocks, nothing, strict=True)])
         for i in (0, 1)
     )
     sensors, notices = dict(recording.sensors), list(recording.notices)
     for i in np.flatnonzero(bad.any(axis=0)).tolist():
         valid = signals[i].valid.copy()
-        said: set[int] = set()
+        reported: set[int] = set()
         for start, stop in find_runs(bad[:, i] > 0):
             # one fault may turn into another without a sample between
             for k in (start, *(np.flatnonzero(np.diff(bad[start:stop, i])) + start + 1).tolist()):
                 first = k - int(back[k, i])
                 valid[first:stop] = False
-                if (kind := int(bad[k, i])) not in said:
-                    said.add(kind)
+                if (kind := int(bad[k, i])) not in reported:
+                    reported.add(kind)
                     notices.append(watch.describe(segments[i], i, kind, first / recording.rate_hz))
         sensors[segments[i]] = signals[i].change(valid=valid, interpolated=signals[i].interpolated & valid)
     marked = replace(recording, sensors=sensors, notices=tuple(notices))
@@ -250,12 +250,12 @@ def drop_stuck_sensors(recording: UniformRecording) -> UniformRecording:
     those that have no sample left.
     """
     stuck = {n.sensor for n in recording.notices if n.code in CODES}
-    kept = {
+    working = {
         s: x
         for s, x in recording.sensors.items()
         if (s not in stuck or x.valid.mean() >= LEAST) and x.valid.any()
     }
-    return recording if len(kept) == len(recording.sensors) else replace(recording, sensors=kept)
+    return recording if len(working) == len(recording.sensors) else replace(recording, sensors=working)
 
 
 LEAST: Final = 0.5

@@ -112,26 +112,26 @@ def _read_sample(acc, gyr, last, x, equal):  # type: ignore[no-untyped-def]
 
 
 @inner_njit(**UNCOUNTED)
-def _follow_repeats(s, i, x, equal, whole, elsewhere, at, rule):  # type: ignore[no-untyped-def]
+def _follow_repeats(s, i, x, equal, whole, elsewhere, sample, rule):  # type: ignore[no-untyped-def]
     """Count repeats of one sample by a whole sensor; returns the number of lost samples, −1 if it measures.
 
     elsewhere : another sensor moves.
     """
-    before = s.same[i]
-    s.same[i] = before + 1 if whole else 0
+    earlier = s.same[i]
+    s.same[i] = earlier + 1 if whole else 0
     for t in range(2):
         if equal[3 * t] and equal[3 * t + 1] and equal[3 * t + 2]:
             s.others[i, t] += elsewhere
         else:
             s.others[i, t] = 0
-            s.others_begun[i, t] = at
+            s.others_begun[i, t] = sample
     long = min(s.others[i, 0], s.others[i, 1]) >= rule.resting
     if long or (s.same[i] >= rule.frozen and not _rests(x, rule)):
         return s.same[i]
     rate = np.sqrt(x[3] ** 2 + x[4] ** 2 + x[5] ** 2)
     # a sample of rest that was repeated, and the next one turns as nobody goes off
-    if before >= rule.frozen and not whole and rate > rule.jump and _rests(s.last[i], rule):
-        return before
+    if earlier >= rule.frozen and not whole and rate > rule.jump and _rests(s.last[i], rule):
+        return earlier
     return np.int64(-1)
 
 
@@ -145,12 +145,12 @@ def _follow_loops(ring, loop, place, same, x, looped):  # type: ignore[no-untype
     j = place - 1
     for p in range(1, P):
         j = j - 1 if j > 0 else j - 1 + P
-        again = True
+        repeats = True
         for c in range(CHANNELS):
             if x[c] != ring[j, c]:
-                again = False
+                repeats = False
                 break
-        loop[p] = loop[p] + 1 if again else 0
+        loop[p] = loop[p] + 1 if repeats else 0
         if loop[p] >= looped and loop[p] >= 2 * (p + 1) and same < p and lost < 0:
             lost = loop[p]
     for c in range(CHANNELS):
@@ -168,7 +168,7 @@ def _ends_a_range(size, full):  # type: ignore[no-untyped-def]
 
 
 @inner_njit(**UNCOUNTED)
-def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-untyped-def]
+def _follow_channels(s, i, x, equal, stays, sample, full, rule):  # type: ignore[no-untyped-def]
     """Count repeats and samples at the range limit for each channel; store the sample.
 
     stays : repeats are counted: the sensor moves, and not all of its channels repeat.
@@ -178,7 +178,7 @@ def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-
         if not equal[c]:
             s.stays[i, c] = max(0.0, s.stays[i, c] - rule.change)
             if s.stays[i, c] == 0.0:
-                s.begun[i, c] = at
+                s.begun[i, c] = sample
         elif stays:
             s.stays[i, c] += 1.0
         s.top[i, c] = max(s.top[i, c], size)
@@ -187,7 +187,7 @@ def _follow_channels(s, i, x, equal, stays, at, full, rule):  # type: ignore[no-
             end = _ends_a_range(size, full) and abs(s.last[i, c]) >= 0.99 * s.top[i, c]
         if end:
             if s.clip[i, c] == 0.0:
-                s.clip_begun[i, c] = at - 1
+                s.clip_begun[i, c] = sample - 1
             s.clip[i, c] += 1.0
         else:
             s.clip[i, c] = max(0.0, s.clip[i, c] - rule.relief)
@@ -240,27 +240,27 @@ def stuck_kernel(acc, gyr, valid, rule, full, state, bad, back):  # type: ignore
 def _watch(acc, gyr, valid, rule, full, s, bad, back, room):  # type: ignore[no-untyped-def]
     """`stuck_kernel` with work arrays provided by the caller."""
     x, equal, moving = room
-    found = False
+    any_fault = False
     for k in range(len(valid)):
-        at = s.now[0] + k
+        sample = s.now[0] + k
         movers = _find_movers(s.dev, valid[k], rule, moving)
         for i in range(len(moving)):
-            fault, before = s.kind[i], np.int64(0)
+            fault, earlier = s.kind[i], np.int64(0)
             if valid[k, i]:
                 whole = _read_sample(acc[k, i], gyr[k, i], s.last[i], x, equal)
-                frozen = _follow_repeats(s, i, x, equal, whole, movers - moving[i] > 0, at, rule)
+                frozen = _follow_repeats(s, i, x, equal, whole, movers - moving[i] > 0, sample, rule)
                 looped = _follow_loops(s.ring[i], s.loop[i], s.place[0], s.same[i], x, rule.looped)
                 if fault == 0 and frozen >= 0:
-                    fault, before = FROZEN, frozen
+                    fault, earlier = FROZEN, frozen
                 elif fault == 0 and looped >= 0 and movers > 0:
-                    fault, before = LOOPED, looped
-                _follow_channels(s, i, x, equal, moving[i] and not whole, at, full, rule)
+                    fault, earlier = LOOPED, looped
+                _follow_channels(s, i, x, equal, moving[i] and not whole, sample, full, rule)
                 if s.kind[i] == 0:
-                    first = _judge(s, i, whole, at, rule)
+                    first = _judge(s, i, whole, sample, rule)
                     if s.kind[i] != 0:
-                        fault, before = s.kind[i], at - first
-            bad[k, i], back[k, i] = fault, before
-            found = found or fault != 0
+                        fault, earlier = s.kind[i], sample - first
+            bad[k, i], back[k, i] = fault, earlier
+            any_fault = any_fault or fault != 0
         s.place[0] = (s.place[0] + 1) % s.ring.shape[1]
     s.now[0] += len(valid)
-    return found
+    return any_fault

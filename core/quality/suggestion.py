@@ -59,14 +59,14 @@ class Suggestion:
 def suggest(recording: Recording) -> dict[str, Suggestion]:
     """Suggest a segment for every sensor: as declared, else by its name, else by its movement."""
     out = {d: Suggestion() for d in recording.streams}
-    taken: set[Segment] = set()
+    assigned: set[Segment] = set()
     for device, segment in recording.segments.items():
         if device in out:
             out[device] = Suggestion(segment, "declared", _part(segment))
-            taken |= {segment} if segment else set()
+            assigned |= {segment} if segment else set()
     named = {d: _label(s) for d, s in recording.streams.items() if d not in recording.segments}
     for device, label in named.items():
-        if label is not None and label not in taken and list(named.values()).count(label) == 1:
+        if label is not None and label not in assigned and list(named.values()).count(label) == 1:
             out[device] = Suggestion(label, "label", _part(label))
     if all(s.basis is None for s in out.values()):
         out |= _pair_of_feet(list(recording.streams)) or _by_movement(list(recording.streams.values()))
@@ -170,9 +170,9 @@ def _legs(
     against = [i for i in limbs if energy[i] > 0.7 * energy[fastest] and alike[fastest, i] < 0.0]
     if not against:
         return None
-    other = max(against, key=lambda i: energy[i])
-    first, second = [fastest], [other]
-    for i in sorted((i for i in limbs if i not in (fastest, other)), key=lambda i: -energy[i]):
+    opposite = max(against, key=lambda i: energy[i])
+    first, second = [fastest], [opposite]
+    for i in sorted((i for i in limbs if i not in (fastest, opposite)), key=lambda i: -energy[i]):
         margin = bond[i, first].max() - bond[i, second].max()
         if abs(margin) < MARGIN:
             return None

@@ -39,10 +39,10 @@ _FIX_GYR = 'declare the unit in the manifest (sources[].gyr_unit: "deg/s" or "ra
 
 def list_suspicions(device: str, f: Facts, acc: Floats, quat: Floats | None) -> list[Notice]:
     """All suspicions about one sensor, severe ones as errors; acc (n, 3) m/s², quat (n, 4)."""
-    found = [*_acceleration(device, f), *_rate(device, f)]
+    notices = [*_acceleration(device, f), *_rate(device, f)]
     if quat is not None:
-        found += _sign(device, acc, quat)
-    return found
+        notices += _sign(device, acc, quat)
+    return notices
 
 
 def _say(code: str, message: str, device: str, severity: Severity = "error") -> Notice:
@@ -157,8 +157,8 @@ def _rate(device: str, f: Facts) -> list[Notice]:
                 device,
             )
         ]
-    rest = LARGEST_BIAS if f.acc_std > WALKING_STD else GYRO_REST
-    if f.still and f.still_gyro is not None and f.still_gyro > rest:
+    rest_limit = LARGEST_BIAS if f.acc_std > WALKING_STD else GYRO_REST
+    if f.still and f.still_gyro is not None and f.still_gyro > rest_limit:
         return [
             _say(
                 "unit_suspect",
@@ -168,7 +168,7 @@ def _rate(device: str, f: Facts) -> list[Notice]:
                     "or the bias is broken.",
                     device=device,
                     still_gyro=f.still_gyro,
-                    rest=rest,
+                    rest=rest_limit,
                     FIX_GYR=_FIX_GYR,
                 ),
                 device,

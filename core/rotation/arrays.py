@@ -191,15 +191,15 @@ def _are_long(a: Floats, b: Floats) -> bool:
     return max(a.size, b.size) > 4 * AT_A_TIME and max(a.ndim, b.ndim) == 2
 
 
-def _by_rows(of: Callable[[Floats, Floats], Floats], width: int, a: Floats, b: Floats) -> Floats:
+def _by_rows(function: Callable[[Floats, Floats], Floats], width: int, a: Floats, b: Floats) -> Floats:
     """Apply a function row-wise to a and b, (n, k) or the same for all rows, block by block.
 
     Temporary arrays then fit into the processor's cache.
     """
-    found = np.empty((max(len(x) for x in (a, b) if x.ndim == 2), width))
-    for part in cut_blocks(len(found)):
-        found[part] = of(*(x[part] if x.ndim == 2 and len(x) == len(found) else x for x in (a, b)))
-    return found
+    result = np.empty((max(len(x) for x in (a, b) if x.ndim == 2), width))
+    for part in cut_blocks(len(result)):
+        result[part] = function(*(x[part] if x.ndim == 2 and len(x) == len(result) else x for x in (a, b)))
+    return result
 
 
 def _components(x: Floats) -> tuple[Floats, ...]:
@@ -212,5 +212,5 @@ def _cross(a: Floats, b: Floats) -> Floats:
     vector.
     """
     ax, ay, az = _components(a)
-    bx, by, bz = _components(b)
-    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=-1)
+    bx, b_y, bz = _components(b)
+    return np.stack((ay * bz - az * b_y, az * bx - ax * bz, ax * b_y - ay * bx), axis=-1)

@@ -77,8 +77,8 @@ def fit_axes(signals: SensorSignals, rate_hz: float, params: SetupParams) -> Axe
     limit = stated / params.misfit_ratio
     if all(_measure(walks, rate_hz, C, limit) >= limit for C in CHOICES[1:]):
         return AxesFit(len(windows), stated)
-    others = [_measure(walks, rate_hz, C) for C in CHOICES[1:]]
-    return AxesFit(len(windows), stated, np.array([stated, *others]))
+    alternatives = [_measure(walks, rate_hz, C) for C in CHOICES[1:]]
+    return AxesFit(len(windows), stated, np.array([stated, *alternatives]))
 
 
 def refuses_choice(signals: SensorSignals, rate_hz: float, choice: Floats, params: SetupParams) -> bool:
@@ -109,18 +109,20 @@ class _Window:
 
 def _list_windows(signals: SensorSignals, quiet: Bools, rate_hz: float, params: SetupParams) -> list[_Window]:
     """Averaging windows in walking that are connected to a rest without lost samples."""
-    length, rest = round(params.sample_s * rate_hz), round(REST_S * rate_hz)
-    found = []
-    for a, b in (r for r in find_runs(quiet) if r[1] - r[0] >= rest):
+    length, rest_samples = round(params.sample_s * rate_hz), round(REST_S * rate_hz)
+    windows = []
+    for a, b in (r for r in find_runs(quiet) if r[1] - r[0] >= rest_samples):
         for begin_s in params.begins_s:
             first = round(begin_s * rate_hz)
             reach, part = first + length, slice(first, first + length)
             if b + reach <= len(quiet):
-                found.append(_Window(slice(b, b + reach), slice(b - rest, b), part))
+                windows.append(_Window(slice(b, b + reach), slice(b - rest_samples, b), part))
             if a - reach >= 0:
                 end = a - reach - 1
-                found.append(_Window(slice(a - 1, end if end >= 0 else None, -1), slice(a, a + rest), part))
-    return [w for w in found if signals.valid[w.order].all() and _moves(signals, w, params)]
+                windows.append(
+                    _Window(slice(a - 1, end if end >= 0 else None, -1), slice(a, a + rest_samples), part)
+                )
+    return [w for w in windows if signals.valid[w.order].all() and _moves(signals, w, params)]
 
 
 def _moves(signals: SensorSignals, window: _Window, params: SetupParams) -> bool:

@@ -46,8 +46,8 @@ def propose_repair(
     recording : as read. uniform : the same recording on the uniform axis.
     """
     params, agreement = params or SetupParams(), agreement or AgreementParams()
-    worn = {s: recording.streams[x.device_id] for s, x in uniform.sensors.items()}
-    return _propose_units(worn) or _propose_axes(uniform, params, agreement)
+    imu_streams = {s: recording.streams[x.device_id] for s, x in uniform.sensors.items()}
+    return _propose_units(imu_streams) or _propose_axes(uniform, params, agreement)
 
 
 def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair | None:
@@ -56,11 +56,11 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
     if exchange is not None and exchange.mirrored:
         turned = {uniform.sensors[s].device_id: SensorCorrection(acc_axes=AGAINST) for s in exchange.mirrored}
         which = _list(sorted(exchange.mirrored))
-        said = Message(
+        message = Message(
             "The accelerometer of {which} has inverted axes: adjacent joints match its mirror image.",
             which=which,
         )
-        return SetupRepair("axes", (said,), exchange.ratio, corrections=turned)
+        return SetupRepair("axes", (message,), exchange.ratio, corrections=turned)
     if exchange is not None and exchange.mixed_up:
         segments = {uniform.sensors[x].device_id: s for s, x in exchange.mixed_up.items()}
         moved: list[str] = [
@@ -68,20 +68,20 @@ def propose_labels(uniform: UniformRecording, agreed: Agreement) -> SetupRepair 
             for s, x in exchange.mixed_up.items()
             if s != x
         ]
-        said = Message("Joint motion shows that sensors are swapped: {moved}.", moved=_list(moved))
-        return SetupRepair("labels", (said,), exchange.ratio, segments)
+        message = Message("Joint motion shows that sensors are swapped: {moved}.", moved=_list(moved))
+        return SetupRepair("labels", (message,), exchange.ratio, segments)
     if exchange is None or exchange.cosine is None:
         return _propose_legs(uniform)
     return None
 
 
-def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
+def _propose_units(streams: Mapping[Segment, ImuStream]) -> SetupRepair | None:
     """Scale factors of sensors with a physically impossible unit, if exactly one simple change resolves
     it.
     """
     corrections: dict[str, SensorCorrection] = {}
-    said: list[str] = []
-    for segment, stream in worn.items():
+    named: list[str] = []
+    for segment, stream in streams.items():
         wrong = _list_errors(stream, measure_stream(stream), stream.acc)
         if not wrong:
             continue
@@ -95,19 +95,19 @@ def _propose_units(worn: Mapping[Segment, ImuStream]) -> SetupRepair | None:
         simplest = [x for x in good if len(x.to_json()) == least]
         if len(simplest) == 1:
             corrections[stream.device_id] = simplest[0]
-            said.append(segment)
+            named.append(segment)
     if not corrections:
         return None
-    if len(set(corrections.values())) == 1 and 2 * len(corrections) > len(worn):
+    if len(set(corrections.values())) == 1 and 2 * len(corrections) > len(streams):
         # one that moves too little to be refused was read like the others of its export
         one = next(iter(corrections.values()))
-        rest = {s: x for s, x in worn.items() if x.device_id not in corrections}
-        follow = {s: x for s, x in rest.items() if not _list_remaining(x, one)}
+        remaining = {s: x for s, x in streams.items() if x.device_id not in corrections}
+        follow = {s: x for s, x in remaining.items() if not _list_remaining(x, one)}
         corrections |= {x.device_id: one for x in follow.values()}
-        said += follow
+        named += follow
     return SetupRepair(
         "units",
-        (Message("The units or signs of {said} are not plausible for body motion.", said=_list(said)),),
+        (Message("The units or signs of {said} are not plausible for body motion.", said=_list(named)),),
         np.inf,
         {},
         corrections,
@@ -130,21 +130,21 @@ def _propose_axes(
     uniform: UniformRecording, params: SetupParams, agreement: AgreementParams
 ) -> SetupRepair | None:
     """Corrections of gyroscopes that do not rotate gravity consistently with their accelerometer."""
-    found = {s: fit_axes(x, uniform.rate_hz, params) for s, x in uniform.sensors.items()}
-    wrong = {s: f.misfits for s, f in found.items() if f is not None and f.misfits is not None}
+    axis_fits = {s: fit_axes(x, uniform.rate_hz, params) for s, x in uniform.sensors.items()}
+    wrong = {s: f.misfits for s, f in axis_fits.items() if f is not None and f.misfits is not None}
     if not wrong:
         return None
     which = _list(sorted(wrong))
-    said: list[str] = [
+    evidence: list[str] = [
         Message(
             "The gyroscope of {which} does not match its accelerometer; other axes or units do.",
             which=which,
         )
     ]
     margin = min(fits[0] / fits[1:].min() for fits in wrong.values())
-    judged = len([f for f in found.values() if f is not None])
-    gyr = _choose_axes(wrong, judged, params)
-    if gyr is not None and 2 * len(wrong) > judged and len(wrong) > 1:
+    count = len([f for f in axis_fits.values() if f is not None])
+    gyr = _choose_axes(wrong, count, params)
+    if gyr is not None and 2 * len(wrong) > count and len(wrong) > 1:
         # one that hardly moves follows the others of its export
         one = next(iter(gyr.values()))
         gyr |= {
@@ -153,19 +153,19 @@ def _propose_axes(
             if s not in gyr and not refuses_choice(x, uniform.rate_hz, one, params)
         }
     if gyr is None:
-        return SetupRepair("axes", tuple(said), margin)
+        return SetupRepair("axes", tuple(evidence), margin)
     turned = _judge_hands(uniform, gyr, agreement)
     if turned is None and not any(_leaves_hands_open(x) for x in gyr.values()):
         turned = frozenset()
     if turned is None:
-        said.append("These sensors do not show whether its accelerometer is inverted as well.")
-        return SetupRepair("axes", tuple(said), margin)
+        evidence.append("These sensors do not show whether its accelerometer is inverted as well.")
+        return SetupRepair("axes", tuple(evidence), margin)
     corrections = {
         uniform.sensors[s].device_id: _correct_gyr(x, AGAINST if s in turned else AS_READ)
         for s, x in gyr.items()
     }
     only_units = all(not x.turns_axes for x in corrections.values())
-    return SetupRepair("units" if only_units else "axes", tuple(said), margin, corrections=corrections)
+    return SetupRepair("units" if only_units else "axes", tuple(evidence), margin, corrections=corrections)
 
 
 def _correct_gyr(gyr: Floats, acc_axes: tuple[str, ...]) -> SensorCorrection:
@@ -174,27 +174,27 @@ def _correct_gyr(gyr: Floats, acc_axes: tuple[str, ...]) -> SensorCorrection:
 
 
 def _choose_axes(
-    wrong: Mapping[Segment, Floats], judged: int, params: SetupParams
+    wrong: Mapping[Segment, Floats], count: int, params: SetupParams
 ) -> dict[Segment, Floats] | None:
     """Correction matrix for each gyroscope; None if several fit equally well.
 
     Sensors of one export are parsed alike: if most of them are wrong they are judged together.
     """
-    if 2 * len(wrong) > judged and len(wrong) > 1:
+    if 2 * len(wrong) > count and len(wrong) > 1:
         # every sensor counts by how well it can be told
         shares = [np.log(fits / fits[1:].min()) for fits in wrong.values()]
         one = _choose_one(np.exp(np.mean(shares, axis=0)), params)
         return None if one is None else dict.fromkeys(wrong, one)
-    found = {segment: _choose_one(fits, params) for segment, fits in wrong.items()}
-    clear = {segment: one for segment, one in found.items() if one is not None}
-    return clear if len(clear) == len(found) else None
+    choices = {segment: _choose_one(fits, params) for segment, fits in wrong.items()}
+    clear = {segment: one for segment, one in choices.items() if one is not None}
+    return clear if len(clear) == len(choices) else None
 
 
 def _choose_one(misfits: Floats, params: SetupParams) -> Floats | None:
     """The only one of `CHOICES` not ruled out; inversion of all signs if that is the best of several."""
     best = int(np.argmin(misfits))
-    alone = np.count_nonzero(misfits <= params.distinct * misfits[best]) == 1
-    return np.asarray(CHOICES[best]) if alone or best == REVERSED else None
+    is_unique = np.count_nonzero(misfits <= params.distinct * misfits[best]) == 1
+    return np.asarray(CHOICES[best]) if is_unique or best == REVERSED else None
 
 
 def _leaves_hands_open(gyr: Floats) -> bool:
@@ -244,15 +244,15 @@ def _propose_legs(uniform: UniformRecording) -> SetupRepair | None:
     left, right = (uniform.sensors[pair[side]] for side in ("left", "right"))
     thin = max(1, round(uniform.rate_hz / LOOK_HZ))
     first, second = (np.linalg.norm(x.gyr - np.median(x.gyr, axis=0), axis=1)[::thin] for x in (left, right))
-    said = find_left_leg(pelvis.acc[::thin], pelvis.gyr[::thin], first, second, uniform.rate_hz / thin)
-    if said != 2:
+    left_leg = find_left_leg(pelvis.acc[::thin], pelvis.gyr[::thin], first, second, uniform.rate_hz / thin)
+    if left_leg != 2:
         return None
-    across: dict[Segment, Segment] = {
-        p[side]: p[other]
+    swapped: dict[Segment, Segment] = {
+        p[side]: p[opposite]
         for p in (FOOT, SHANK, THIGH)
-        for side, other in zip(SIDES, reversed(SIDES), strict=True)
+        for side, opposite in zip(SIDES, reversed(SIDES), strict=True)
     }
-    segments = {x.device_id: across.get(s, s) for s, x in uniform.sensors.items()}
+    segments = {x.device_id: swapped.get(s, s) for s, x in uniform.sensors.items()}
     evidence = (
         "The pelvis is pushed away from the swing leg: the left and right sensors appear to be swapped."
     )

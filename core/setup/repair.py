@@ -66,28 +66,34 @@ class SetupRepair:
         """Manifest with this correction added; other entries are kept, earlier corrections are applied
         first.
         """
-        said = dict(manifest)
+        result = dict(manifest)
         if self.segments:
-            others = {d: s for d, s in (said.get("sensors") or {}).items() if s is None}
+            other_entries = {d: s for d, s in (result.get("sensors") or {}).items() if s is None}
             mine = {d.lower() for d in self.segments}
-            said["sensors"] = {d: s for d, s in others.items() if d.lower() not in mine} | dict(self.segments)
+            result["sensors"] = {d: s for d, s in other_entries.items() if d.lower() not in mine} | dict(
+                self.segments
+            )
         if self.corrections:
-            before = {
+            earlier = {
                 d.lower(): x
-                for d, x in manifest_of({"corrections": said.get("corrections")}).corrections.items()
+                for d, x in manifest_of({"corrections": result.get("corrections")}).corrections.items()
             }
             mine = {d.lower() for d in self.corrections}
-            kept = {d: x for d, x in (said.get("corrections") or {}).items() if d.lower() not in mine}
-            said["corrections"] = kept | {
-                d: x.follow(before.get(d.lower(), SensorCorrection())).to_json()
+            kept_corrections = {
+                d: x for d, x in (result.get("corrections") or {}).items() if d.lower() not in mine
+            }
+            result["corrections"] = kept_corrections | {
+                d: x.follow(earlier.get(d.lower(), SensorCorrection())).to_json()
                 for d, x in self.corrections.items()
             }
         if self.mounting:
-            others = {
-                k: x for k, x in (said.get("mounting") or {}).items() if segment_named(k) not in self.mounting
+            other_entries = {
+                k: x
+                for k, x in (result.get("mounting") or {}).items()
+                if segment_named(k) not in self.mounting
             }
-            said["mounting"] = others | dict(self.mounting)
-        return said
+            result["mounting"] = other_entries | dict(self.mounting)
+        return result
 
     def to_json(self) -> dict[str, object]:
         """JSON-serialisable values; `repair` is the correction as a manifest, None if unknown."""

@@ -179,25 +179,25 @@ def simulate_day(
     aside = _sway(t, day, phases, style.sway_m) if style.sway_m else np.zeros(len(t))
     way = np.stack((forward, aside, height), axis=-1) + rotate(q, mount.position_m)
     path = SensorPath(t, way, sign_continuous(multiply(q, mount.q_segment_sensor)))
-    made = record({"chest": path}, setup, draws, height_m, protocol="activity")
+    recorded = record({"chest": path}, setup, draws, height_m, protocol="activity")
     truth = ChestTruth(
         t[::every], setup.rate_hz, pitch[::every], height[::every], forward[::every], phases, steps, mount
     )
-    return ChestSimulation(**vars(made), truth=truth)
+    return ChestSimulation(**vars(recorded), truth=truth)
 
 
 def _phases(day: Day, style: ChestStyle) -> tuple[Phase, ...]:
     """Postures and the transitions between them; walking starts directly from standing."""
     phases: list[Phase] = []
-    now, before = 0.0, day[0].posture
+    now, previous = 0.0, day[0].posture
     for hold in day:
-        if _upright(before) != _upright(hold.posture):
-            takes = style.lying_s if "lie" in (_upright(before), _upright(hold.posture)) else style.change_s
-            phases.append(Phase(f"{_upright(before)}_to_{_upright(hold.posture)}", now, now + takes))
+        if _upright(previous) != _upright(hold.posture):
+            takes = style.lying_s if "lie" in (_upright(previous), _upright(hold.posture)) else style.change_s
+            phases.append(Phase(f"{_upright(previous)}_to_{_upright(hold.posture)}", now, now + takes))
             now += takes
         phases.append(Phase(hold.posture, now, now + hold.duration_s))
         # after a bow one is as one was
-        now, before = now + hold.duration_s, before if hold.posture == "bow" else hold.posture
+        now, previous = now + hold.duration_s, previous if hold.posture == "bow" else hold.posture
     return tuple(phases)
 
 

@@ -222,10 +222,10 @@ def simulate_daily_life(
     steps: list[Floats] = []
     now = 0.0
     for i in range(len(items)):
-        made = person.outline(i)
-        phases += [Phase(p.kind, p.start_s + now, p.end_s + now) for p in made.phases]
-        steps.append(made.steps_s + now)
-        now += made.samples / rate_hz
+        plan = person.outline(i)
+        phases += [Phase(p.kind, p.start_s + now, p.end_s + now) for p in plan.phases]
+        steps.append(plan.steps_s + now)
+        now += plan.samples / rate_hz
     stream = LongStream(
         device_id=f"DAY{seed:05d}",
         source=f"daily_{seed}",
@@ -237,26 +237,26 @@ def simulate_daily_life(
     return DailySimulation(stream, tuple(phases), np.concatenate(steps), style, height_m, mount)
 
 
-def record_daily_life(made: DailySimulation) -> Recording:
+def record_daily_life(simulation: DailySimulation) -> Recording:
     """The whole recording in memory, assigned to the chest."""
-    blocks = list(made.stream.open_blocks())
+    blocks = list(simulation.stream.open_blocks())
     t_s, acc = (np.concatenate([getattr(b, name) for b in blocks]) for name in ("t_s", "acc"))
     gyr = [b.gyr for b in blocks if b.gyr is not None]
     rates = np.concatenate(gyr) if gyr else None
     stream = ImuStream(
-        device_id=made.stream.device_id,
-        source=made.stream.source,
+        device_id=simulation.stream.device_id,
+        source=simulation.stream.source,
         t_s=t_s,
         acc=acc,
         gyr=rates,
         mag=None,
         quat=None,
-        rate_hz=made.stream.rate_hz,
+        rate_hz=simulation.stream.rate_hz,
         clock="device",
         digest=signal_digest(acc, rates, None),
     )
-    who = Subject(height_m=made.height_m)
-    return Recording({stream.device_id: stream}, {stream.device_id: "chest"}, who, "activity")
+    subject = Subject(height_m=simulation.height_m)
+    return Recording({stream.device_id: stream}, {stream.device_id: "chest"}, subject, "activity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,15 +283,15 @@ class _Person:
 
     def outline(self, i: int) -> _Outline:
         """Times of item i, without its samples."""
-        item, before = self.items[i], self._before(i)
-        takes = self._change_s(before, item.posture)
+        item, previous = self.items[i], self._before(i)
+        takes = self._change_s(previous, item.posture)
         length = takes + item.duration_s
         samples = round(length * self.rate_hz)
         # the moving part is worked out, what is held after it is not
         moving = samples if item.posture in STEPPING or item.posture == "bow" else round(takes * self.rate_hz)
         phases = []
         if takes:
-            phases.append(Phase(f"{_base(before)}_to_{_base(item.posture)}", 0.0, takes))
+            phases.append(Phase(f"{_base(previous)}_to_{_base(item.posture)}", 0.0, takes))
         phases.append(Phase(item.posture, takes, samples / self.rate_hz))
         steps: Floats = np.empty(0)
         if item.posture in STEPPING:
@@ -303,12 +303,12 @@ class _Person:
         """Blocks of the recording from its first sample."""
         first = 0
         for i in range(len(self.items)):
-            made = self.outline(i)
+            plan = self.outline(i)
             rng = np.random.default_rng(np.random.SeedSequence((self.seed, 17, i)))
-            acc, gyr = self._move(i, made) if made.moving else (np.empty((0, 3)), np.empty((0, 3)))
+            acc, gyr = self._move(i, plan) if plan.moving else (np.empty((0, 3)), np.empty((0, 3)))
             yield self._block(first, acc, gyr, rng)
             first += len(acc)
-            left = made.samples - len(acc)
+            left = plan.samples - len(acc)
             while left > 0:
                 count = min(left, round(ITEM_S * self.rate_hz))
                 yield self._block(first, *self._hold(self.items[i].posture, first, count, rng), rng)
@@ -316,20 +316,20 @@ class _Person:
 
     def _before(self, i: int) -> str:
         """Initial posture of item i."""
-        before = next((x.posture for x in reversed(self.items[:i]) if x.posture != "bow"), None)
-        return self.items[i].posture if before is None else before
+        previous = next((x.posture for x in reversed(self.items[:i]) if x.posture != "bow"), None)
+        return self.items[i].posture if previous is None else previous
 
-    def _change_s(self, before: str, posture: str) -> float:
-        a, b = _base(before), _base(posture)
+    def _change_s(self, previous: str, posture: str) -> float:
+        a, b = _base(previous), _base(posture)
         if a == b or OFF in (a, b):
             return 0.0
         return self.style.lying_s if "lie" in (a, b) else self.style.change_s
 
-    def _move(self, i: int, made: _Outline) -> tuple[Floats, Floats]:
+    def _move(self, i: int, outline: _Outline) -> tuple[Floats, Floats]:
         """Samples of the moving part of an item."""
-        item, before = self.items[i], _base(self._before(i))
+        item, previous = self.items[i], _base(self._before(i))
         edge = 1.0
-        day = [PostureHold(before, edge)] if before != OFF else []  # type: ignore[arg-type]
+        day = [PostureHold(previous, edge)] if previous != OFF else []  # type: ignore[arg-type]
         if item.posture in STEPPING or item.posture == "bow":
             day.append(PostureHold(item.posture, item.duration_s, item.steps_per_min))  # type: ignore[arg-type]
         day.append(PostureHold(_base(item.posture), edge))  # type: ignore[arg-type]
@@ -337,7 +337,7 @@ class _Person:
         simulated = simulate_day(tuple(day), self.height_m, self.seed, setup, self.style, self.mount)
         signals = simulated.ideal["chest"]
         start = round(edge * self.rate_hz)
-        part = slice(start, start + made.moving)
+        part = slice(start, start + outline.moving)
         return signals.acc[part], signals.gyr[part]
 
     def _hold(self, posture: str, first: int, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
@@ -349,8 +349,8 @@ class _Person:
         pitch: Floats = np.full(count, POSTURES[_base(posture)].pitch_rad)  # type: ignore[index]
         breath = np.random.default_rng((self.seed, 19)).uniform(*BREATH_RAD)
         pitch = np.asarray(pitch + breath * np.sin(2.0 * np.pi * BREATH_HZ * t))
-        for at in t[0] + np.cumsum(rng.exponential(SHIFT_EVERY_S, 40)):
-            pitch = pitch + rng.normal(0.0, SHIFT_RAD) * np.exp(-(((t - at) / 1.5) ** 2))
+        for shift_s in t[0] + np.cumsum(rng.exponential(SHIFT_EVERY_S, 40)):
+            pitch = pitch + rng.normal(0.0, SHIFT_RAD) * np.exp(-(((t - shift_s) / 1.5) ** 2))
         roll = np.full(count, 0.5 * np.pi if posture == "lie_side" else 0.0)
         q = multiply(multiply(Q_NEUTRAL, about(2, -pitch)), about(1, roll))
         up = rotate(conjugate(multiply(q, self.mount.q_segment_sensor)), np.array([0.0, 0.0, GRAVITY]))

@@ -121,10 +121,10 @@ def simulate_swings_and_bows(
     mounts = draw_mounts({s: PLACES[s] for s in q}, person.scale, setup.mount_spread_rad, draws.mounts)
     body = BodyPath(t, q, p)
     paths = {s: place_sensor(body, s, mount, setup.tissue) for s, mount in mounts.items()}
-    made = record(paths, setup, draws, height_m)
-    q, p = ({s: a[::every] for s, a in of.items()} for of in (q, p))
+    recorded = record(paths, setup, draws, height_m)
+    q, p = ({s: a[::every] for s, a in by_segment.items()} for by_segment in (q, p))
     truth = FunctionalTruth(t[::every], setup.rate_hz, q, p, joint_angles(q), phases, mounts)
-    return FunctionalSimulation(**vars(made), truth=truth)
+    return FunctionalSimulation(**vars(recorded), truth=truth)
 
 
 def _plan(does: SwingsAndBows) -> tuple[Phase, ...]:
@@ -153,21 +153,21 @@ def _pose(
         if phase.kind == "stand":
             continue
         into = t - phase.start_s
-        shown = smoothstep(into / RAMP_S) * smoothstep((phase.end_s - t) / RAMP_S)
+        envelope = smoothstep(into / RAMP_S) * smoothstep((phase.end_s - t) / RAMP_S)
         start, turn = rng.uniform(0.0, 2.0 * np.pi, 2)
         if phase.kind == "bow":
             cycle = 2.0 * np.pi * into / does.bow_s
-            bow += shown * does.bow_rad * 0.5 * (1.0 - np.cos(cycle))
-            sway += shown * does.sway_rad * np.sin(does.aside_per_swing * cycle + start)
+            bow += envelope * does.bow_rad * 0.5 * (1.0 - np.cos(cycle))
+            sway += envelope * does.sway_rad * np.sin(does.aside_per_swing * cycle + start)
             continue
         side: Side = "left" if phase.kind == "swing_left" else "right"
         cycle = 2.0 * np.pi * into / does.swing_s
         flexion, aside, turned, knee = hip[side]
         middle_rad = 0.5 * (does.forward_rad - does.backward_rad)
-        flexion += shown * (middle_rad + 0.5 * (does.forward_rad + does.backward_rad) * np.sin(cycle))
-        aside += shown * does.aside_rad * np.sin(does.aside_per_swing * cycle + start)
-        turned += shown * does.turned_rad * np.sin(cycle + turn)
-        knee += shown * does.knee_rad
+        flexion += envelope * (middle_rad + 0.5 * (does.forward_rad + does.backward_rad) * np.sin(cycle))
+        aside += envelope * does.aside_rad * np.sin(does.aside_per_swing * cycle + start)
+        turned += envelope * does.turned_rad * np.sin(cycle + turn)
+        knee += envelope * does.knee_rad
     pelvis = multiply(multiply(Q_NEUTRAL, about(2, -bow)), about(0, sway))
     q: dict[Segment, Floats] = {"pelvis": pelvis}
     middle = np.tile([0.0, 0.0, anatomy.ankle_height + anatomy.shank + anatomy.thigh], (len(t), 1))
@@ -178,8 +178,8 @@ def _pose(
         thigh = multiply(thigh, about(1, turned))
         shank = multiply(thigh, about(2, -knee))
         joint = middle + rotate(Q_NEUTRAL, np.array([0.0, 0.0, SIGN[side] * anatomy.hip_width / 2.0]))
-        below = joint + rotate(thigh, np.array([0.0, -anatomy.thigh, 0.0]))
-        ankle = below + rotate(shank, np.array([0.0, -anatomy.shank, 0.0]))
+        knee_centre = joint + rotate(thigh, np.array([0.0, -anatomy.thigh, 0.0]))
+        ankle = knee_centre + rotate(shank, np.array([0.0, -anatomy.shank, 0.0]))
         q |= {THIGH[side]: thigh, SHANK[side]: shank, FOOT[side]: shank}
-        p |= {THIGH[side]: joint, SHANK[side]: below, FOOT[side]: ankle}
+        p |= {THIGH[side]: joint, SHANK[side]: knee_centre, FOOT[side]: ankle}
     return q, p

@@ -53,9 +53,9 @@ def field_at(p: Floats, north_rad: float, dipoles: tuple[Dipole, ...]) -> Floats
     field = np.tile(earth_field(north_rad), (len(p), 1))
     for dipole in dipoles:
         moment = np.array(dipole.moment)
-        away = p - dipole.position_m
-        distance = np.linalg.norm(away, axis=1, keepdims=True)
-        unit = away / np.maximum(distance, 1e-9)
+        offset = p - dipole.position_m
+        distance = np.linalg.norm(offset, axis=1, keepdims=True)
+        unit = offset / np.maximum(distance, 1e-9)
         near = np.maximum(distance, IRON_SIZE_M)
         field += (3.0 * (unit @ moment)[:, None] * unit - moment) / near**3
     return field

@@ -107,16 +107,22 @@ class PotterWalk:
         track = self.p if p is None else p
         lengths, widths = [], []
         for side in SIDES:
-            other: Side = "left" if side == "right" else "right"
-            here = track[np.array(self.footfalls[side]) + self.footfall_still, LEG[side], :2]
-            there = np.array(self.footfalls[other]) + self.footfall_still
+            opposite: Side = "left" if side == "right" else "right"
+            own_positions = track[np.array(self.footfalls[side]) + self.footfall_still, LEG[side], :2]
+            opposite_samples = np.array(self.footfalls[opposite]) + self.footfall_still
             for a, b, first, last in zip(
-                here[:-1], here[1:], self.footfalls[side][:-1], self.footfalls[side][1:], strict=True
+                own_positions[:-1],
+                own_positions[1:],
+                self.footfalls[side][:-1],
+                self.footfalls[side][1:],
+                strict=True,
             ):
                 along = b - a
                 length = float(np.hypot(*along))
-                between = there[(there > first + self.footfall_still) & (there < last)]
-                off = track[between[0], LEG[other], :2] - a
+                inside = opposite_samples[
+                    (opposite_samples > first + self.footfall_still) & (opposite_samples < last)
+                ]
+                off = track[inside[0], LEG[opposite], :2] - a
                 lengths.append(length)
                 widths.append(abs(along[0] * off[1] - along[1] * off[0]) / length)
         return np.array(lengths), np.array(widths)

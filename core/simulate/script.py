@@ -207,10 +207,10 @@ class _Walk:
     steps: list[Footprint] = field(default_factory=list)
     stands: list[tuple[float, float]] = field(default_factory=list)
 
-    def land(self, of: Side, wider_m: float) -> tuple[float, float, float]:
+    def land(self, side: Side, wider_m: float) -> tuple[float, float, float]:
         """Lateral position of a footprint relative to the path, and its direction."""
-        lateral = -SIGN[of] * (self.walker.width_m / 2.0 + wider_m)
-        foot = self.heading - SIGN[of] * self.walker.sides[of].toe_out_rad
+        lateral = -SIGN[side] * (self.walker.width_m / 2.0 + wider_m)
+        foot = self.heading - SIGN[side] * self.walker.sides[side].toe_out_rad
         return self.x - lateral * sin(self.heading), self.y + lateral * cos(self.heading), foot
 
     def stand(self, duration_s: float) -> None:

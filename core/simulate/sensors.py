@@ -63,8 +63,8 @@ class SensorPath:
         """The same path delayed by `by_s`; stationary before its start and after its end."""
         if by_s == 0.0:
             return self
-        at = np.clip(self.t_s - by_s, self.t_s[0], self.t_s[-1])
-        p, q = resample_pose(self.t_s, self.p, self.q, at)
+        times = np.clip(self.t_s - by_s, self.t_s[0], self.t_s[-1])
+        p, q = resample_pose(self.t_s, self.p, self.q, times)
         return SensorPath(self.t_s, p, q)
 
 

@@ -54,6 +54,6 @@ def simulate(
     mounts = draw_mounts(PLACES, walker.scale, setup.mount_spread_rad, draws.mounts)
     impacts = draw_impacts(motion, draws.impacts) if setup.impacts else ()
     paths = {s: place_sensor(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
-    made = record(paths, setup, draws, walker.height_m)
-    truth = truth_of(motion, every, mounts, made.errors, seed)
-    return Simulation(**vars(made), truth=truth)
+    recorded = record(paths, setup, draws, walker.height_m)
+    truth = truth_of(motion, every, mounts, recorded.errors, seed)
+    return Simulation(**vars(recorded), truth=truth)

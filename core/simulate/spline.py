@@ -38,7 +38,7 @@ def sign_continuous(q: Floats) -> Floats:
     return q * np.concatenate(([1.0], np.cumprod(flips)))[:, None]
 
 
-def resample_pose(t: Floats, p: Floats, q: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """The pose between its samples: p (m, 3) and unit q (m, 4) at times `at` (m,) within those of t."""
-    pose = make_interp_spline(t, np.column_stack((p, q)), k=5)(at)
+def resample_pose(t: Floats, p: Floats, q: Floats, times: Floats) -> tuple[Floats, Floats]:
+    """The pose between its samples: p (m, 3) and unit q (m, 4) at times `times` (m,) within those of t."""
+    pose = make_interp_spline(t, np.column_stack((p, q)), k=5)(times)
     return np.ascontiguousarray(pose[:, :3]), normalise(pose[:, 3:])

@@ -102,8 +102,8 @@ class Squats:
     @property
     def sides(self) -> tuple[Side, ...]:
         """The squatting legs, in the order in which they begin."""
-        other: Side = "left" if self.side == "right" else "right"
-        return (self.side,) if self.other == "left_out" else (self.side, other)
+        opposite: Side = "left" if self.side == "right" else "right"
+        return (self.side,) if self.other == "left_out" else (self.side, opposite)
 
     @property
     def turns(self) -> int:
@@ -191,9 +191,9 @@ def simulate_squats(
     mounts = drawn | {segment: mount for segment, mount in (mounts or {}).items() if segment in drawn}
     body = BodyPath(t, q, p)
     paths = {s: place_sensor(body, s, mount, setup.tissue) for s, mount in mounts.items()}
-    made = record(paths, setup, draws, height_m, protocol="squat")
+    recorded = record(paths, setup, draws, height_m, protocol="squat")
 
-    q, p = ({s: a[::every] for s, a in of.items()} for of in (q, p))
+    q, p = ({s: a[::every] for s, a in by_segment.items()} for by_segment in (q, p))
     angles = joint_angles(q)
     truth = SquatTruth(
         t_s=t[::every],
@@ -206,7 +206,7 @@ def simulate_squats(
         depths_rad=tuple((squats.depth_rad * deep).ravel().tolist()),
         mounts=mounts,
     )
-    return SquatSimulation(**vars(made), truth=truth)
+    return SquatSimulation(**vars(recorded), truth=truth)
 
 
 def _depth(t: Floats, squats: Squats, starts: Floats, deep: Floats) -> Floats:
@@ -246,7 +246,7 @@ def _stand_and_lift(
     t: Floats, squats: Squats, sides: tuple[Side, Side], turn: int, depth: Floats, anatomy: Anatomy
 ) -> tuple[dict[Segment, Floats], dict[Segment, Floats]]:
     """Body that squats on the first side of a series and lifts the foot of the second."""
-    carries, other = sides
+    carries, lifted = sides
     q, p = _stand_on(squats, carries, depth, anatomy)
     begin = squats.lead_s + turn * squats.turn_s
     end = begin + squats.turn_s - squats.rest_s - LIFT_S
@@ -258,11 +258,11 @@ def _stand_and_lift(
     thigh = multiply(Q_NEUTRAL, about(2, forward))
     shank = multiply(thigh, about(2, -bent))
     foot = multiply(shank, about(2, np.full(len(t), squats.standing_ankle_rad)))
-    hip = p["pelvis"] + rotate(q["pelvis"], np.array([0.0, 0.0, 0.5 * SIGN[other] * anatomy.hip_width]))
+    hip = p["pelvis"] + rotate(q["pelvis"], np.array([0.0, 0.0, 0.5 * SIGN[lifted] * anatomy.hip_width]))
     knee = hip - rotate(thigh, np.array([0.0, anatomy.thigh, 0.0]))
     ankle = knee - rotate(shank, np.array([0.0, anatomy.shank, 0.0]))
-    q |= {THIGH[other]: thigh, SHANK[other]: shank, FOOT[other]: foot}
-    return q, p | {THIGH[other]: hip, SHANK[other]: knee, FOOT[other]: ankle}
+    q |= {THIGH[lifted]: thigh, SHANK[lifted]: shank, FOOT[lifted]: foot}
+    return q, p | {THIGH[lifted]: hip, SHANK[lifted]: knee, FOOT[lifted]: ankle}
 
 
 def _stand_on(
@@ -285,8 +285,8 @@ def _stand_on(
         thigh = multiply(multiply(shank, about(2, knee)), about(0, inward))
     trunk = multiply(Q_NEUTRAL, about(2, -lean))
     aside = np.array([0.0, 0.0, SIGN[side] * anatomy.hip_width / 2.0])
-    beside = 0.0 if squats.other == "left_out" else -aside[2]
-    ankle_joint = np.tile([0.0, beside, anatomy.ankle_height], (len(depth), 1))
+    lateral = 0.0 if squats.other == "left_out" else -aside[2]
+    ankle_joint = np.tile([0.0, lateral, anatomy.ankle_height], (len(depth), 1))
     knee_joint = ankle_joint + rotate(shank, np.array([0.0, anatomy.shank, 0.0]))
     hip_joint = knee_joint + rotate(thigh, np.array([0.0, anatomy.thigh, 0.0]))
     foot = np.tile(Q_NEUTRAL, (len(depth), 1))

@@ -49,8 +49,8 @@ def draw_leg(height_m: float, side: Side, seed: int = 0) -> tuple[LegGeometry, d
     aside = rng.uniform(-0.01, 0.01, 2)
     leg = replace(measure_leg(height_m, side), tibia_aside=float(aside[0]), thigh_aside=float(aside[1]))
     turns = rng.uniform(-TURNED, TURNED, (3, 3))
-    worn = make_fixed_mounts(side)
-    return leg, {s: to_matrix(exp(turn)) @ worn[s] for s, turn in zip(worn, turns, strict=True)}
+    mounts = make_fixed_mounts(side)
+    return leg, {s: to_matrix(exp(turn)) @ mounts[s] for s, turn in zip(mounts, turns, strict=True)}
 
 
 def place_as_agreed(height_m: float, sides: Sequence[Side]) -> dict[Segment, Mount]:

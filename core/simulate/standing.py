@@ -99,12 +99,12 @@ def simulate_sway(
     none = (0.0, 0.0, 0.0)
     mounts = draw_mounts(dict.fromkeys(HEIGHTS_M, none), scale, setup.mount_spread_rad, draws.mounts)
     paths, truth = {}, {}
-    for segment, above in HEIGHTS_M.items():
-        height = scale * above
+    for segment, height_fraction in HEIGHTS_M.items():
+        height = scale * height_fraction
         mount = Mount(np.zeros(3), mounts[segment].q_segment_sensor)
         way = rotate(q, np.array([0.0, height, 0.0]))
         paths[segment] = SensorPath(t, way, sign_continuous(multiply(q, mount.q_segment_sensor)))
         gain = GRAVITY + height * (2.0 * pi * sway.frequency_hz) ** 2
         truth[segment] = SwayTruth(sway, gain * sway.forward_rad, gain * sway.side_rad)
-    made = record(paths, setup, draws, height_m, protocol="standing_eyes_open")
-    return SwaySimulation(**vars(made), truth=truth)
+    recorded = record(paths, setup, draws, height_m, protocol="standing_eyes_open")
+    return SwaySimulation(**vars(recorded), truth=truth)

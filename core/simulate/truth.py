@@ -204,9 +204,9 @@ def _lift5(motion: Motion, side: Side, timing: FootTiming) -> Floats:
     out = np.full(len(timing.release), np.nan)
     for i, (release, contact) in enumerate(zip(timing.release, timing.contact, strict=True)):
         first, last = np.searchsorted(t, (release, contact))
-        above = np.flatnonzero(sole[first:last] > LIFT_M)
-        if len(above):
-            k = first + above[0]
+        lifted = np.flatnonzero(sole[first:last] > LIFT_M)
+        if len(lifted):
+            k = first + lifted[0]
             out[i] = t[k] - (sole[k] - LIFT_M) / (sole[k] - sole[k - 1]) * (t[k] - t[k - 1])
     return out
 
@@ -222,7 +222,7 @@ def _between(t: Floats, starts: Floats, ends: Floats) -> Bools:
 def _strides(motion: Motion, contacts: Mapping[Side, TrueContacts]) -> tuple[TrueStride, ...]:
     strides = []
     for side in SIDES:
-        other = motion.plan.footprints["left" if side == "right" else "right"]
+        opposite_prints = motion.plan.footprints["left" if side == "right" else "right"]
         prints, events = motion.plan.footprints[side], contacts[side]
         for i in range(1, len(prints) - 1):
             a, b = prints[i], prints[i + 1]
@@ -231,7 +231,7 @@ def _strides(motion: Motion, contacts: Mapping[Side, TrueContacts]) -> tuple[Tru
             along = np.array([b.x_m - a.x_m, b.y_m - a.y_m])
             length = float(np.hypot(*along))
             lift = float(events.lift5[i])
-            opposite = next(f for f in reversed(other) if f.time_s < b.time_s)
+            opposite = next(f for f in reversed(opposite_prints) if f.time_s < b.time_s)
             off = np.array([opposite.x_m - a.x_m, opposite.y_m - a.y_m])
             # on the spot there is no line of progression: the distance between the feet is the width
             width = abs(along[0] * off[1] - along[1] * off[0]) / length if length > 0.05 else np.hypot(*off)

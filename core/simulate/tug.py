@@ -172,7 +172,7 @@ def _simulate(
     else:
         kinds = ("sit_to_stand", "stand_to_sit")
         starts = [(kinds[i % 2], sit_s + i * (change_s + pause_s)) for i in range(2 * rises)]
-    chair = tuple(ChairChange(kind, at, at + change_s) for kind, at in starts)  # type: ignore[arg-type]
+    chair = tuple(ChairChange(kind, from_s, from_s + change_s) for kind, from_s in starts)  # type: ignore[arg-type]
     motion = move(planned, walker, every * setup.rate_hz, chair)
     impacts = draw_impacts(motion, draws.impacts) if setup.impacts else ()
 
@@ -181,7 +181,7 @@ def _simulate(
     paths = {s: place_sensor(motion, s, mount, setup.tissue, impacts) for s, mount in mounts.items()}
     lean = POSTURES["stand"].pitch_rad + sit_and_rise(motion.t_s, chair).chest_rad
     paths["chest"] = _chest_path(motion, lean, STERNUM_M * walker.scale, chest["chest"])
-    made = record(paths, setup, draws, height_m, protocol="tug" if planned.steps else "five_sit_to_stand")
+    recorded = record(paths, setup, draws, height_m, protocol="tug" if planned.steps else "five_sit_to_stand")
 
     changes = tuple(_see_change(motion.t_s, lean, change) for change in chair)
     truth = ChairTruth(
@@ -196,7 +196,7 @@ def _simulate(
         contacts_s=tuple(step.time_s for step in planned.steps),
         mounts=mounts | chest,
     )
-    return ChairSimulation(**vars(made), truth=truth)
+    return ChairSimulation(**vars(recorded), truth=truth)
 
 
 def _chest_path(motion: Motion, lean: Floats, above_m: float, mount: Mount) -> SensorPath:
@@ -228,12 +228,12 @@ def _segments(motion: Motion, changes: tuple[Phase, ...]) -> tuple[Phase, ...]:
     turned = np.abs(motion.heading_rad)
     turns = []
     halves = np.flatnonzero(turned >= 0.5 * pi)[0], np.flatnonzero(turned >= 1.5 * pi)[0]
-    between = sum(halves) // 2
-    for part in (slice(None, between), slice(between, None)):
+    middle = sum(halves) // 2
+    for part in (slice(None, middle), slice(middle, None)):
         own = np.zeros(len(rate))
         own[part] = rate[part]
-        above = np.flatnonzero(own > 0.5 * (own**2).sum() / own.sum())
-        turns.append((float(motion.t_s[above[0]]), float(motion.t_s[above[-1]])))
+        turning_samples = np.flatnonzero(own > 0.5 * (own**2).sum() / own.sum())
+        turns.append((float(motion.t_s[turning_samples[0]]), float(motion.t_s[turning_samples[-1]])))
     (a, b), (c, d) = turns
     return (
         rise,

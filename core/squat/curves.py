@@ -28,11 +28,11 @@ def cut_curves(angles: JointAngles, side: Side, bounds: Sequence[tuple[float, fl
     bounds : start and end of every repetition, s.
     """
     own = {name: angles.angles.get(f"{name}_{SUFFIX[side]}") for name in CURVES}
-    known = {name: values for name, values in own.items() if values is not None}
-    if not known or not bounds:
+    available = {name: values for name, values in own.items() if values is not None}
+    if not available or not bounds:
         return {}
-    rows = resample(known.values(), angles.t_s, np.array(bounds))
-    found = dict(zip(known, rows, strict=True))
-    if all(name in found for name in INWARD):
-        found[VALGUS] = np.add(*(found[name] - found[name][:, :1] for name in INWARD))
-    return found
+    rows = resample(available.values(), angles.t_s, np.array(bounds))
+    curves = dict(zip(available, rows, strict=True))
+    if all(name in curves for name in INWARD):
+        curves[VALGUS] = np.add(*(curves[name] - curves[name][:, :1] for name in INWARD))
+    return curves

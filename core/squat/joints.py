@@ -34,10 +34,10 @@ def name_joint_angles(angles: Floats, side: Side) -> dict[str, Floats]:
         "knee": -angles[:, [3]],
         "hip": cardan_zxy(hip),
     }
-    found = {}
+    named = {}
     for joint, values in about_axes.items():
         for (name, right, left), column in zip(SIGNS[joint], values.T, strict=False):
-            found[f"{name}_{SUFFIX[side]}"] = np.ascontiguousarray(
+            named[f"{name}_{SUFFIX[side]}"] = np.ascontiguousarray(
                 (right if side == "right" else left) * column
             )
-    return found
+    return named

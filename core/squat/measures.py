@@ -66,28 +66,28 @@ def measure_squats(
     """
     suffix = SUFFIX[side]
     own = {name: angles.angles.get(f"{name}_{suffix}") for name in CURVES}
-    known = {name: values for name, values in own.items() if values is not None}
-    if len(known) < len(CURVES):
+    available = {name: values for name, values in own.items() if values is not None}
+    if len(available) < len(CURVES):
         return SquatSide(side, (), {}, {}, _summarise({}, side, "no_angles"))
     t_s = angles.t_s
     foot_rate = _foot_rate(recording, side)
-    repetitions = find_repetitions(known[KNEE], t_s, side, foot_rate, params, leg.stands)
-    counted = [r for r in repetitions if r.excluded is None]
-    if not counted:
+    repetitions = find_repetitions(available[KNEE], t_s, side, foot_rate, params, leg.stands)
+    valid = [r for r in repetitions if r.excluded is None]
+    if not valid:
         squatted = any(r.excluded != FOOT_LIFTED for r in repetitions)
         reason = "no_counted_repetitions" if squatted else "no_repetitions"
         return SquatSide(side, repetitions, {}, {}, _summarise({}, side, reason))
-    found = cut_curves(angles, side, [(r.start_s, r.end_s) for r in counted])
-    values = _measure(counted, known, leg)
-    return SquatSide(side, repetitions, values, found, _summarise(values, side, None))
+    curves = cut_curves(angles, side, [(r.start_s, r.end_s) for r in valid])
+    values = _measure(valid, available, leg)
+    return SquatSide(side, repetitions, values, curves, _summarise(values, side, None))
 
 
-def _measure(counted: list[Repetition], angles: Mapping[str, Floats], leg: LegMotion) -> dict[str, Floats]:
+def _measure(valid: list[Repetition], angles: Mapping[str, Floats], leg: LegMotion) -> dict[str, Floats]:
     """Measure → values (counted,)."""
     height = _hip_height(leg)
     rows: list[tuple[float, ...]] = []
-    for r in counted:
-        part, at = slice(r.first, r.last + 1), r.bottom - r.first
+    for r in valid:
+        part, deepest = slice(r.first, r.last + 1), r.bottom - r.first
         adduction, rotation = (angles[name][part] - angles[name][r.first] for name in INWARD)
         valgus = adduction + rotation
         rows.append(
@@ -95,9 +95,9 @@ def _measure(counted: list[Repetition], angles: Mapping[str, Floats], leg: LegMo
                 np.degrees(angles[KNEE][r.bottom]),
                 float(height[r.first] - height[part].min()),
                 np.degrees(valgus.max()),
-                np.degrees(valgus[at]),
-                np.degrees(adduction[at]),
-                np.degrees(rotation[at]),
+                np.degrees(valgus[deepest]),
+                np.degrees(adduction[deepest]),
+                np.degrees(rotation[deepest]),
                 r.end_s - r.start_s,
                 r.descent_s,
                 r.ascent_s,

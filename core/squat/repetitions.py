@@ -108,30 +108,30 @@ def find_repetitions(
     is not detected.
     """
     params = params or RepetitionParams()
-    known = np.isfinite(knee)
-    if known.sum() < 2:
+    is_known = np.isfinite(knee)
+    if is_known.sum() < 2:
         return ()
     # a bridge over silences, so that a squat with one in it is found and excluded
-    bridged = np.interp(t_s, t_s[known], knee[known])
-    begins, ends = np.flatnonzero(known)[[0, -1]]
-    found = []
-    for before, bottom, after in _find_bottoms(bridged, params):
-        first, last = _find_edges(bridged, before, bottom, after, params)
+    bridged = np.interp(t_s, t_s[is_known], knee[is_known])
+    begins, ends = np.flatnonzero(is_known)[[0, -1]]
+    repetitions = []
+    for preceding, bottom, following in _find_bottoms(bridged, params):
+        first, last = _find_edges(bridged, preceding, bottom, following, params)
         part = slice(first, last + 1)
         down, up = bridged[bottom] - bridged[first], bridged[bottom] - bridged[last]
         cut = (first <= begins or last >= ends) and min(down, up) < params.level * max(down, up)
-        why = None
+        reason = None
         if stands is not None and float(np.mean(~stands[part])) > params.lifted:
-            why = FOOT_LIFTED
+            reason = FOOT_LIFTED
         elif cut:
-            why = "incomplete"
-        elif not known[part].all():
-            why = "signal_lost"
+            reason = "incomplete"
+        elif not is_known[part].all():
+            reason = "signal_lost"
         elif foot_rate is not None and float(np.mean(foot_rate[part])) > params.foot_rate:
-            why = "foot_moved"
+            reason = "foot_moved"
         start_s, bottom_s, end_s = (float(t_s[k]) for k in (first, bottom, last))
-        found.append(Repetition(side, first, bottom, last, start_s, bottom_s, end_s, why))
-    return tuple(found)
+        repetitions.append(Repetition(side, first, bottom, last, start_s, bottom_s, end_s, reason))
+    return tuple(repetitions)
 
 
 def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int, int]]:
@@ -148,16 +148,16 @@ def _find_bottoms(knee: Floats, params: RepetitionParams) -> list[tuple[int, int
                 bottoms[-1] = max(last, peak, key=lambda k: float(knee[k]))
                 continue
         bottoms.append(peak)
-    between = [a + int(np.argmin(knee[a : b + 1])) for a, b in pairwise(bottoms)]
-    starts, ends = [0, *between], [*between, len(knee) - 1]
+    straightest = [a + int(np.argmin(knee[a : b + 1])) for a, b in pairwise(bottoms)]
+    starts, ends = [0, *straightest], [*straightest, len(knee) - 1]
     return list(zip(starts, bottoms, ends, strict=False))
 
 
 def _find_edges(
-    knee: Floats, before: int, bottom: int, after: int, params: RepetitionParams
+    knee: Floats, preceding: int, bottom: int, following: int, params: RepetitionParams
 ) -> tuple[int, int]:
     """Last sample before and first after the deepest one at which the knee is nearly extended."""
-    down, up = knee[before : bottom + 1], knee[bottom : after + 1]
+    down, up = knee[preceding : bottom + 1], knee[bottom : following + 1]
     start = down.min() + params.edge * (knee[bottom] - down.min())
     end = up.min() + params.edge * (knee[bottom] - up.min())
-    return before + int(np.flatnonzero(down <= start)[-1]), bottom + int(np.flatnonzero(up <= end)[0])
+    return preceding + int(np.flatnonzero(down <= start)[-1]), bottom + int(np.flatnonzero(up <= end)[0])

@@ -195,16 +195,16 @@ def make_case(
                 missing=", ".join(missing),
             ),
         )
-    at = calibrated.recording.t_s[signals.first :]
-    found = {
+    times = calibrated.recording.t_s[signals.first :]
+    reference_angles = {
         joint: np.interp(
-            at, reference.t_s, reference.angles[f"{joint}_{SUFFIX[side]}"], left=np.nan, right=np.nan
+            times, reference.t_s, reference.angles[f"{joint}_{SUFFIX[side]}"], left=np.nan, right=np.nan
         )
         for joint in JOINTS
     }
-    if not all(np.isfinite(a[case.counted]).any() for a in found.values()):
+    if not all(np.isfinite(a[case.counted]).any() for a in reference_angles.values()):
         raise EstimationError("no_reference", "Reference and recording have no time in common.")
-    return replace(case, reference=found)
+    return replace(case, reference=reference_angles)
 
 
 def analyse_legs(
@@ -223,7 +223,7 @@ def analyse_legs(
     As `make_case` and `analyse_sensitivity`; `no_reference` if the reference has no leg of the recording.
     """
     legs = [g for g in geometries if reference is None or not reference.list_missing(g.side)]
-    found: dict[Side, SensitivityTable] = {}
+    tables: dict[Side, SensitivityTable] = {}
     for k, geometry in enumerate(legs or geometries):
         case = make_case(calibrated, geometry, reference, from_standing=from_standing, params=params)
 
@@ -231,8 +231,8 @@ def analyse_legs(
             if progress is not None:
                 progress(name, (done + share) / len(legs))
 
-        found[geometry.side] = analyse_sensitivity(case, params=params, progress=say)
-    return found
+        tables[geometry.side] = analyse_sensitivity(case, params=params, progress=say)
+    return tables
 
 
 def analyse_sensitivity(
@@ -278,21 +278,21 @@ def _change(
     case: SquatCase, name: str, step: float, errors: Floats, params: ChainFilterParams | None
 ) -> Floats:
     """Mean |change of the errors| (7,) for a parameter changed by ± step."""
-    both = []
-    for by in (step, -step):
-        geometry, mounts = _put_off(case, name, by)
-        both.append(np.abs(_run(case, geometry, mounts, params) - errors))
-    return np.asarray(0.5 * (both[0] + both[1]))
+    changes = []
+    for offset in (step, -step):
+        geometry, mounts = _put_off(case, name, offset)
+        changes.append(np.abs(_run(case, geometry, mounts, params) - errors))
+    return np.asarray(0.5 * (changes[0] + changes[1]))
 
 
-def _put_off(case: SquatCase, name: str, by: float) -> tuple[LegGeometry, Mapping[Segment, Floats]]:
+def _put_off(case: SquatCase, name: str, offset: float) -> tuple[LegGeometry, Mapping[Segment, Floats]]:
     """The model with one parameter changed by m or rad."""
     if name in LENGTHS:
         field = LENGTHS[name]
-        return replace(case.geometry, **{field: getattr(case.geometry, field) + by}), case.mounts
+        return replace(case.geometry, **{field: getattr(case.geometry, field) + offset}), case.mounts
     sensor, axis = TURNS[name]
     segment = leg_segments(case.geometry.side)[sensor]
-    turned = to_matrix(about(axis, by)) @ case.mounts[segment]
+    turned = to_matrix(about(axis, offset)) @ case.mounts[segment]
     return case.geometry, {**case.mounts, segment: turned}
 
 
@@ -315,8 +315,8 @@ def _run(
     case: SquatCase, geometry: LegGeometry, mounts: Mapping[Segment, Floats], params: ChainFilterParams | None
 ) -> Floats:
     """RMS errors (7,) of the angles, rad."""
-    found = _estimate(case, geometry, mounts, params)
-    off = np.stack([found[joint] - case.reference[joint] for joint in JOINTS])[:, case.counted]
+    estimated = _estimate(case, geometry, mounts, params)
+    off = np.stack([estimated[joint] - case.reference[joint] for joint in JOINTS])[:, case.counted]
     return np.asarray(np.sqrt(np.nanmean(off**2, axis=1)))
 
 
@@ -327,15 +327,15 @@ def _estimate(
     chain = build_leg_chain(geometry, mounts)
     motion = ChainFilter(chain, case.rate_hz, case.rest_force, params).advance(case.gyr, case.acc, case.valid)
     named = name_joint_angles(motion.angles, geometry.side)
-    found = {joint: named[f"{joint}_{SUFFIX[geometry.side]}"] for joint in JOINTS}
+    by_joint = {joint: named[f"{joint}_{SUFFIX[geometry.side]}"] for joint in JOINTS}
     if case.zero is None:
-        return found
-    return {joint: a - a[case.zero].mean() for joint, a in found.items()}
+        return by_joint
+    return {joint: a - a[case.zero].mean() for joint, a in by_joint.items()}
 
 
 def average_sensitivity(values: Sequence[Floats | None]) -> Floats:
     """Column means over defined values, as the last row of the paper's tables; NaN without any."""
     rows = np.array([v for v in values if v is not None]).reshape(-1, len(JOINTS))
-    known = np.isfinite(rows)
+    is_finite = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(known, rows, 0.0).sum(axis=0) / known.sum(axis=0))
+        return np.asarray(np.where(is_finite, rows, 0.0).sum(axis=0) / is_finite.sum(axis=0))

@@ -15,11 +15,11 @@ def find_squat_sides(recording: UniformRecording) -> tuple[Side, ...]:
     ------
     EstimationError `segments_missing` if no leg has sensors on shank and thigh, or the pelvis has none.
     """
-    worn = tuple(side for side in SIDES if set(leg_segments(side)) <= set(recording.sensors))
-    if not worn:
+    sides = tuple(side for side in SIDES if set(leg_segments(side)) <= set(recording.sensors))
+    if not sides:
         raise EstimationError(
             "segments_missing",
             "Squats require sensors on the pelvis and on the shank and thigh of each squatting leg; "
             "attach or assign them.",
         )
-    return worn
+    return sides

@@ -66,8 +66,8 @@ class BodyMeasures:
 
     def complete_from(self, other: BodyMeasures) -> BodyMeasures:
         """These measures, with missing ones taken from `other`."""
-        known = {f.name: getattr(self, f.name) for f in fields(self)}
-        return BodyMeasures(**{k: getattr(other, k) if v is None else v for k, v in known.items()})
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        return BodyMeasures(**{k: getattr(other, k) if v is None else v for k, v in values.items()})
 
     def to_json(self) -> dict[str, float]:
         """The measured lengths, with the keys of a manifest's `subject.measures`."""

@@ -119,13 +119,15 @@ class WalkingCondition:
     def words(self) -> str:
         """Description in words, "own pace, no aid, shoes"; an orthosis is mentioned only if used."""
         floor = [] if self.protocol == "walk" else [self._floor]
-        told = ["with feedback"] if self.feedback else []
-        said = {name: CHOICES[name].get(value or "") for name, value in self.stated.items()}
-        if not any(said.values()):
-            return ", ".join([*floor, NOT_STATED, *told])
+        feedback_words = ["with feedback"] if self.feedback else []
+        choices = {name: CHOICES[name].get(value or "") for name, value in self.stated.items()}
+        if not any(choices.values()):
+            return ", ".join([*floor, NOT_STATED, *feedback_words])
         if self.orthosis == "none":
-            del said["orthosis"]
-        return ", ".join([*floor, *(text or f"{name} not stated" for name, text in said.items()), *told])
+            del choices["orthosis"]
+        return ", ".join(
+            [*floor, *(text or f"{name} not stated" for name, text in choices.items()), *feedback_words]
+        )
 
     @property
     def _floor(self) -> str:
@@ -156,9 +158,9 @@ def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, .
     """Differences between the conditions of one recording and a later one, in words: "own pace, then
     fast".
     """
-    found: list[str] = []
+    differences: list[str] = []
     if a.protocol != b.protocol:
-        found.append(
+        differences.append(
             Message(
                 "{protocol}, then {protocol2}",
                 protocol=PROTOCOL_WORDS[a.protocol],
@@ -169,15 +171,17 @@ def compare_conditions(a: WalkingCondition, b: WalkingCondition) -> tuple[str, .
         speeds = [
             "unknown" if c.belt_speed_mps is None else f"{c.belt_speed_mps:.2f}\u202fm/s" for c in (a, b)
         ]
-        found.append(Message("belt speed {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1]))
+        differences.append(
+            Message("belt speed {speeds}, then {speeds2}", speeds=speeds[0], speeds2=speeds[1])
+        )
     for name, words in CHOICES.items():
         values = [getattr(c, name) for c in (a, b)]
         if values[0] != values[1]:
             first, second = (words.get(v or "", Message("{name} not stated", name=name)) for v in values)
-            found.append(Message("{first}, then {second}", first=first, second=second))
+            differences.append(Message("{first}, then {second}", first=first, second=second))
     if a.feedback != b.feedback:
-        found.append("with feedback, then without" if a.feedback else "without feedback, then with")
-    return tuple(found)
+        differences.append("with feedback, then without" if a.feedback else "without feedback, then with")
+    return tuple(differences)
 
 
 def _same_belt(a: float | None, b: float | None) -> bool:

@@ -38,10 +38,10 @@ def check_standing(standing_deg: Mapping[str, float]) -> None:
     """
     for name, value in standing_deg.items():
         if name not in NAMES:
-            known = ", ".join(NAMES)
+            names_text = ", ".join(NAMES)
             raise ParameterError(
                 "unknown_angle",
-                Message("'{name}' is no angle; expected one of {known}.", name=name, known=known),
+                Message("'{name}' is no angle; expected one of {known}.", name=name, known=names_text),
             )
         if not abs(value) <= LIMIT_DEG:
             raise ParameterError(

@@ -13,11 +13,11 @@ Columns = NDArray[np.int64] | None
 """Places of some sensors among others; None = all of these in the same order, nothing is copied."""
 
 
-def find_columns(wanted: Sequence[Segment], there: Sequence[Segment]) -> Columns:
+def find_columns(requested: Sequence[Segment], available: Sequence[Segment]) -> Columns:
     """Columns of some segments among others."""
-    if tuple(wanted) == tuple(there):
+    if tuple(requested) == tuple(available):
         return None
-    return np.array([there.index(s) for s in wanted], np.int64)
+    return np.array([available.index(s) for s in requested], np.int64)
 
 
 def take_mask(mask: Bools, columns: Columns) -> Bools:

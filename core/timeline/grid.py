@@ -77,14 +77,14 @@ def lay_points(  # type: ignore[no-untyped-def]
             # written as the advance is: one rounding decides whether a sample is passed and whether it is met
             on_sample = a - slack <= t[s, b] <= a + slack
             past = b == n - 1 and not on_sample
-            share, between = 0.0, False
+            share, is_between = 0.0, False
             if not on_sample and not past:
                 hole = t[s, b + 1] - t[s, b]
                 missing = hole - step[s]
-                between = missing > 0.5 * step[s]
-                past = between and missing > max_gap + 0.5 * step[s]
+                is_between = missing > 0.5 * step[s]
+                past = is_between and missing > max_gap + 0.5 * step[s]
                 share = 0.0 if past else (a - t[s, b]) / hole
-            valid[k, s], filled[k, s] = not past, between and not past
+            valid[k, s], filled[k, s] = not past, is_between and not past
             for c in range(x.shape[2]):
                 value = x[s, b, c]
                 if share != 0.0:

@@ -179,8 +179,8 @@ class LiveAxis:
         live = last_s == furthest  # of a single stream, and where the senders' clocks are of no use
         if len(last_s) > 1:
             due = [x.overdue_s(self._sent[1]) <= p.silent_s for x in self._queues.values()]
-            wanted = np.array(due) & (last_s >= furthest - p.behind_s)
-            live = wanted if wanted.any() else live
+            awaited = np.array(due) & (last_s >= furthest - p.behind_s)
+            live = awaited if awaited.any() else live
         until = self._buffer.until(live)
         # a little less than `on_grid`, so that rounding never gives out a point that its sample is not on
         past = floor((until - self._start_s) * self.rate_hz + 0.9 * p.timeline.on_grid) + 1
@@ -200,13 +200,13 @@ class LiveAxis:
         self._notify("clock_jump", queue, "has a clock jump; batches after the jump are excluded.")
         return True
 
-    def _notify(self, code: str, queue: StreamQueue, what: str) -> None:
+    def _notify(self, code: str, queue: StreamQueue, text: str) -> None:
         """Add a notice about a stream, once."""
         if (code, queue.stream) in self._notified:
             return
         notice = Notice(
             code,
-            Message("{ids} {what}", ids=", ".join(queue.ids), what=what),
+            Message("{ids} {what}", ids=", ".join(queue.ids), what=text),
             queue.ids[0],
             self._next / self.rate_hz,
         )
@@ -246,5 +246,7 @@ def compile_axis_kernels() -> None:
     hello = Hello("", "cli", (StreamInfo(0, 100.0, "shared", (SensorInfo("", "pelvis"),)),))
     axis = LiveAxis(hello)
     for seq in range(2):
-        at = 10_000 * seq
-        axis.push(decode_batch(encode_batch(SampleBatch(0, seq, at, at, np.zeros((1, 1, 9), np.float32)))))
+        time_us = 10_000 * seq
+        axis.push(
+            decode_batch(encode_batch(SampleBatch(0, seq, time_us, time_us, np.zeros((1, 1, 9), np.float32))))
+        )

@@ -19,10 +19,10 @@ class StreamQueue:
     """Queue of the sensors of one stream that are mapped to a segment."""
 
     def __init__(self, info: StreamInfo) -> None:
-        worn = [i for i, x in enumerate(info.sensors) if x.segment is not None]
+        used = [i for i, x in enumerate(info.sensors) if x.segment is not None]
         self.stream, self.rate_hz = info.stream, info.rate_hz
-        self.columns = np.array(worn, np.int64)
-        self.ids = tuple(info.sensors[i].id for i in worn)
+        self.columns = np.array(used, np.int64)
+        self.ids = tuple(info.sensors[i].id for i in used)
         self.held: list[tuple[Micros, NDArray[np.float32]]] = []
         self.samples = 0
         self.heard = False

@@ -33,10 +33,10 @@ def synchronise(recording: Recording, params: TimelineParams | None = None) -> U
         no_common_clock, sample_rate_too_low, no_overlap, too_short, clock_jump.
     """
     params = params or TimelineParams()
-    worn = _find_worn(recording)
-    _refuse_copies(worn)
-    notices = [*recording.notices, *_merge_alike([n for s in worn.values() for n in s.notices])]
-    usable = _find_usable(worn)
+    streams = _find_worn(recording)
+    _refuse_copies(streams)
+    notices = [*recording.notices, *_merge_alike([n for s in streams.values() for n in s.notices])]
+    usable = _find_usable(streams)
     _check_clocks(usable)
     rate, rate_notices = _common_rate(usable, params)
     start, end, length_notices = _common_range(usable, params)
@@ -79,7 +79,7 @@ def _merge_alike(notices: list[Notice]) -> list[Notice]:
 
 def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
     """The sensors mapped to a segment."""
-    worn = {
+    mapped = {
         s: recording.streams[d]
         for d, s in recording.segments.items()
         if s is not None and d in recording.streams
@@ -95,7 +95,7 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
                 protocol=recording.protocol,
             ),
         )
-    if not worn:
+    if not mapped:
         raise SignalError(
             "no_mapping",
             Message(
@@ -103,29 +103,29 @@ def _find_worn(recording: Recording) -> dict[Segment, ImuStream]:
                 streams=", ".join(recording.streams),
             ),
         )
-    return worn
+    return mapped
 
 
-def _find_usable(worn: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
+def _find_usable(streams: Mapping[Segment, ImuStream]) -> dict[Segment, ImuStream]:
     """The sensors with a gyroscope."""
-    usable = {segment: s for segment, s in worn.items() if s.held("gyr") is not None}
+    usable = {segment: s for segment, s in streams.items() if s.held("gyr") is not None}
     if not usable:
         raise SignalError(
             "missing_gyro",
             Message(
                 "None of the {worn} sensors has a gyroscope signal, so no orientation can be "
                 "computed. Export the recording again with the rate of turn (Gyr_X, Gyr_Y, Gyr_Z).",
-                worn=len(worn),
+                worn=len(streams),
             ),
         )
     return usable
 
 
-def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:
+def _refuse_copies(streams: dict[Segment, ImuStream]) -> None:
     """Reject identical signals on two segments: one of the files is a copy under another id."""
-    seen: dict[str, Segment] = {}
-    for segment, s in worn.items():
-        first = seen.setdefault(s.digest, segment)
+    by_digest: dict[str, Segment] = {}
+    for segment, s in streams.items():
+        first = by_digest.setdefault(s.digest, segment)
         if first != segment:
             raise SignalError(
                 "duplicate_stream",
@@ -133,7 +133,7 @@ def _refuse_copies(worn: dict[Segment, ImuStream]) -> None:
                     "Sensors {device_id} ({first}) and {device_id2} ({segment}) hold identical samples: "
                     "one is a copy under another id. Keep the one that was worn there, set the other to "
                     "'not used'.",
-                    device_id=worn[first].device_id,
+                    device_id=streams[first].device_id,
                     first=first,
                     device_id2=s.device_id,
                     segment=segment,
@@ -286,13 +286,13 @@ def _lay_sensor(
     )
 
 
-def _hold_once(laid: Floats, own: Floats) -> Floats:
+def _hold_once(resampled: Floats, own: Floats) -> Floats:
     """The stream's own memory from the first point on, if every point is one of its samples.
 
     Not for non-contiguous rows, over which sums would round differently.
     """
-    own = own[: len(laid)]
-    return own if own.flags.c_contiguous and np.array_equal(laid, own) else laid
+    own = own[: len(resampled)]
+    return own if own.flags.c_contiguous and np.array_equal(resampled, own) else resampled
 
 
 def _lies_on_axis(
@@ -306,8 +306,8 @@ def _lies_on_axis(
     if past > len(t_s) or not good[first:past].all():
         return False
     axis, own = start_s + np.arange(samples) / rate, t_s[first:past]
-    alone = past == len(t_s) or t_s[past] > axis[-1] + slack
-    return bool(alone and np.all((own >= axis - slack) & (own <= axis + slack)))
+    is_single = past == len(t_s) or t_s[past] > axis[-1] + slack
+    return bool(is_single and np.all((own >= axis - slack) & (own <= axis + slack)))
 
 
 def _lay_magnetometer(

@@ -141,7 +141,9 @@ def test_l7s_from_three_and_two_sensors_is_within_the_limits() -> None:
     retained: dict[str, list[tuple[float, float]]] = {}
     segments: Worn
     for segments in ("3I", "2I"):
-        poses = l7s_poses(orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), worn=segments)
+        poses = l7s_poses(
+            orientations, acceleration, steps, BodyModel.from_height(HEIGHT_M), configuration=segments
+        )
         _, result = scores(raw_degrees(dict(poses.q)))
         figures = [
             (

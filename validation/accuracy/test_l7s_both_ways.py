@@ -137,7 +137,7 @@ def estimate(
         free_acceleration(source.calibrated, source.orientations),
         steps_of(source.calibrated),
         body or source.body,
-        worn=segments,
+        configuration=segments,
         both_ways=both_ways,
     )
     q = dict(poses.q)
@@ -272,7 +272,7 @@ def reach_errors(segments: Worn, both_ways: bool) -> tuple[Floats, Floats]:
         free_acceleration(owner.calibrated, owner.orientations),
         steps_of(owner.calibrated),
         owner.body,
-        worn=segments,
+        configuration=segments,
         both_ways=both_ways,
     )
     near, bent = [], []

@@ -99,7 +99,7 @@ def paths(calibrated: CalibratedRecording, orientations: Orientations, body: Bod
     acceleration, still = free_acceleration(calibrated, orientations), steps_of(calibrated)
     result: dict[str, Paths] = {}
     for segments in get_args(Worn):
-        poses = l7s_poses(orientations, acceleration, still, body, worn=segments)
+        poses = l7s_poses(orientations, acceleration, still, body, configuration=segments)
         result[f"L7S-{segments}"] = {s: poses.p[FOOT[s]] for s in SIDES}
     run = run_erkf(calibrated, orientations, body, tuple(FOOT.values()), ErkfParams.people())
     result[OWN] = foot_tracks(run, replace_orientations(run, orientations), body).p

@@ -42,16 +42,16 @@ def _share_pelvis(legs: list[LegMotion], rate_hz: float) -> tuple[Floats, Bools]
 
     width = max(1, round(HAND_OVER_S * rate_hz))
     lead = legs[0].orientations.q["pelvis"]
-    total, known = np.zeros_like(lead), np.zeros(len(lead), bool)
+    total, is_known = np.zeros_like(lead), np.zeros(len(lead), bool)
     for leg in legs:
-        own, there = leg.orientations.q["pelvis"], leg.orientations.valid["pelvis"]
-        weight = uniform_filter1d(leg.stands.astype(float), width, mode="nearest") * there
+        own, available = leg.orientations.q["pelvis"], leg.orientations.valid["pelvis"]
+        weight = uniform_filter1d(leg.stands.astype(float), width, mode="nearest") * available
         same_half = np.where((own * lead).sum(axis=1) < 0.0, -1.0, 1.0)
         total += (weight * same_half)[:, None] * own
-        known |= weight > 0.0
+        is_known |= weight > 0.0
     norm = np.linalg.norm(total, axis=1)
-    known &= norm > 0.0
-    return np.where(known[:, None], total / np.where(known, norm, 1.0)[:, None], lead), known
+    is_known &= norm > 0.0
+    return np.where(is_known[:, None], total / np.where(is_known, norm, 1.0)[:, None], lead), is_known
 
 
 def draw_legs(legs: Mapping[Side, LegMotion], height_m: float | None) -> PoseEstimate:
@@ -70,7 +70,9 @@ def draw_legs(legs: Mapping[Side, LegMotion], height_m: float | None) -> PoseEst
         valid[foot] = valid[shank]
         valid[thigh] = valid[thigh] & valid[shank]
     contacts = {side: leg.stands for side, leg in legs.items()}
-    shown = replace(joined, q=q, valid=valid)
-    poses = forward_kinematics(shown, nominal_body(height_m)[0], contacts)
-    told = {"requested": AUTO, "sensors": tuple(s for s in valid if s in (SQUAT_CHAIN.sensors or ()))}
-    return PoseEstimate(joined, replace(poses, method=SQUAT_CHAIN.method, notices=(), diagnostics=told), None)
+    figure = replace(joined, q=q, valid=valid)
+    poses = forward_kinematics(figure, nominal_body(height_m)[0], contacts)
+    settings = {"requested": AUTO, "sensors": tuple(s for s in valid if s in (SQUAT_CHAIN.sensors or ()))}
+    return PoseEstimate(
+        joined, replace(poses, method=SQUAT_CHAIN.method, notices=(), diagnostics=settings), None
+    )

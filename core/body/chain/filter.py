@@ -141,8 +141,8 @@ class ChainFilter:
         """
         gyr, acc = (np.ascontiguousarray(a, np.float64) for a in (gyr, acc))
         shape = (len(gyr), len(self._P), 3)
-        known = np.ones(shape[:2], np.bool_) if valid is None else np.ascontiguousarray(valid, np.bool_)
-        if gyr.shape != shape or acc.shape != shape or known.shape != shape[:2]:
+        is_valid = np.ones(shape[:2], np.bool_) if valid is None else np.ascontiguousarray(valid, np.bool_)
+        if gyr.shape != shape or acc.shape != shape or is_valid.shape != shape[:2]:
             raise EstimationError(
                 "bad_shape",
                 Message(
@@ -150,13 +150,13 @@ class ChainFilter:
                     shape=shape,
                     shape2=gyr.shape,
                     shape3=acc.shape,
-                    shape4=known.shape,
+                    shape4=is_valid.shape,
                 ),
             )
-        if not (np.isfinite(gyr[known]).all() and np.isfinite(acc[known]).all()):
+        if not (np.isfinite(gyr[is_valid]).all() and np.isfinite(acc[is_valid]).all()):
             raise EstimationError("filter_diverged", "A sample is not a number; mark it as invalid.")
         out = np.empty((shape[0], len(self._x), 3))
-        broken = filter_chain(self._arrays, self._noise, self._x, self._P, gyr, acc, known, out)
+        broken = filter_chain(self._arrays, self._noise, self._x, self._P, gyr, acc, is_valid, out)
         if broken >= 0:
             raise EstimationError(
                 "filter_diverged",
@@ -171,15 +171,15 @@ def _stand(
 ) -> None:
     """Write the pose in which a chain at rest measures `force`, x (J, 3), and its covariance P (S, n, n)."""
     s = make_scratch(P.shape[1])
-    below = np.zeros((6, 3))
-    below[:3] = chain.base
+    base_motion = np.zeros((6, 3))
+    base_motion[:3] = chain.base
     for i, measured in enumerate(force):
         a, b = int(chain.first[i]), int(chain.first[i + 1])
         n = 3 * (b - a)
         motion = np.empty((6, 3))
         prior = np.diag(1.0 / start_sd[a:b] ** 2)
         for _ in range(START_STEPS):
-            climb(chain, i, x, below, motion, n, s)
+            climb(chain, i, x, base_motion, motion, n, s)
             predict_signals(motion, chain.places[i], chain.mounts[i], n, s)
             H = s.H[3:, :n:3]
             information = H.T @ H / acc_noise**2 + prior
@@ -189,5 +189,5 @@ def _stand(
         for j in range(b - a):
             P[i, 3 * j + 1, 3 * j + 1] = START_RATE**2
             P[i, 3 * j + 2, 3 * j + 2] = START_ACCELERATION**2
-        climb(chain, i, x, below, motion, 0, s)
-        below = motion.copy()
+        climb(chain, i, x, base_motion, motion, 0, s)
+        base_motion = motion.copy()

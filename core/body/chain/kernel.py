@@ -170,9 +170,9 @@ def predict_signals(motion, place, mount, n, s):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def climb(chain, i, x, below, motion, n, s):  # type: ignore[no-untyped-def]
+def climb(chain, i, x, lower, motion, n, s):  # type: ignore[no-untyped-def]
     """Write the motion of the link of sensor i from that of the link below its group, x (J, 3)."""
-    motion[:] = below
+    motion[:] = lower
     if n > 0:
         s.d[:n] = 0.0
     for j in range(chain.first[i], chain.first[i + 1]):
@@ -274,23 +274,23 @@ def filter_chain(chain, noise, x, P, gyr, acc, valid, out):  # type: ignore[no-u
     """
     s = make_scratch(P.shape[1])
     for k in range(gyr.shape[0]):
-        below, motion = s.motion[0], s.motion[1]
-        below[:] = 0.0
-        below[0:3] = chain.base
+        lower, motion = s.motion[0], s.motion[1]
+        lower[:] = 0.0
+        lower[0:3] = chain.base
         for i in range(gyr.shape[1]):
             a, b = chain.first[i], chain.first[i + 1]
             n = 3 * (b - a)
             own = P[i, :n, :n]
             if valid[k, i]:
                 predict_states(x[a:b], own, noise)
-                climb(chain, i, x, below, motion, n, s)
+                climb(chain, i, x, lower, motion, n, s)
                 predict_signals(motion, chain.places[i], chain.mounts[i], n, s)
                 if not correct_states(x[a:b], own, gyr[k, i], acc[k, i], chain.bounded[a:b], noise, s):
                     return k
             else:
                 lose_states(x[a:b], own, noise.step)
-            climb(chain, i, x, below, motion, 0, s)
-            below[:] = motion
+            climb(chain, i, x, lower, motion, 0, s)
+            lower[:] = motion
             for j in range(a, b):
                 out[k, j, 0], out[k, j, 1] = x[j, 0], x[j, 1]
                 out[k, j, 2] = np.sqrt(P[i, 3 * (j - a), 3 * (j - a)])

@@ -80,9 +80,9 @@ def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
     mounts = {s: calibration.segments[s].R_segment_sensor for s in segments}
     acc, gyr, valid = correct_signals(calibrated, segments)
     standing = index_window(calibration.zero, recording.rate_hz)
-    known = valid[standing]
-    if not known.any(axis=0).all():
-        silent = segments[int(np.argmin(known.any(axis=0)))]
+    standing_valid = valid[standing]
+    if not standing_valid.any(axis=0).all():
+        silent = segments[int(np.argmin(standing_valid.any(axis=0)))]
         raise EstimationError(
             "no_standing",
             Message(
@@ -97,7 +97,9 @@ def read_leg_signals(calibrated: CalibratedRecording, side: Side) -> LegSignals:
         gyr=np.ascontiguousarray(gyr[first:]),
         acc=np.ascontiguousarray(acc[first:]),
         valid=np.ascontiguousarray(valid[first:]),
-        rest_force=np.stack([acc[standing, i][known[:, i]].mean(axis=0) for i in range(len(segments))]),
+        rest_force=np.stack(
+            [acc[standing, i][standing_valid[:, i]].mean(axis=0) for i in range(len(segments))]
+        ),
         first=first,
         standing=slice(0, standing.stop - first),
     )

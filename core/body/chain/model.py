@@ -106,12 +106,12 @@ class RevoluteChain:
         """World orientations (n, 3, 3) of the links that carry sensors, from angles (n, J)."""
         from sagittal.core.rotation import exp, to_matrix
 
-        found, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
+        rotations, R = [], np.broadcast_to(self.base, (len(angles), 3, 3))
         for j, axis in enumerate(self.axes):
             R = R @ to_matrix(exp(angles[:, j : j + 1] * axis))
             if j + 1 in self.first:
-                found.append(R)
-        return found
+                rotations.append(R)
+        return rotations
 
 
 def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
@@ -119,26 +119,26 @@ def leg_segments(side: Side) -> tuple[Segment, Segment, Segment]:
     return SHANK[side], THIGH[side], "pelvis"
 
 
-def require_leg(side: Side, there: Collection[Segment]) -> tuple[Segment, Segment, Segment]:
+def require_leg(side: Side, available: Collection[Segment]) -> tuple[Segment, Segment, Segment]:
     """`leg_segments`, checked to be all available.
 
     Raises
     ------
     EstimationError `segments_missing`.
     """
-    worn = leg_segments(side)
-    missing = [s for s in worn if s not in there]
+    required = leg_segments(side)
+    missing = [s for s in required if s not in available]
     if missing:
         raise EstimationError(
             "segments_missing",
             Message(
                 "A squat requires sensors on {worn}; missing: {missing}.",
-                worn=", ".join(worn),
+                worn=", ".join(required),
                 missing=", ".join(missing),
             ),
             sensor=missing[0],
         )
-    return worn
+    return required
 
 
 def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> RevoluteChain:
@@ -152,7 +152,7 @@ def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> 
     ------
     EstimationError `segments_missing`.
     """
-    worn = require_leg(geometry.side, mounts)
+    segments = require_leg(geometry.side, mounts)
     offsets = np.zeros((7, 3))
     offsets[3], offsets[4] = geometry.knee_from_ankle(), geometry.hip_from_knee()
     return RevoluteChain(
@@ -166,7 +166,7 @@ def build_leg_chain(geometry: LegGeometry, mounts: Mapping[Segment, Floats]) -> 
                 geometry.back_sensor_from_hip(),
             )
         ),
-        mounts=np.stack([np.asarray(mounts[s], np.float64) for s in worn]),
+        mounts=np.stack([np.asarray(mounts[s], np.float64) for s in segments]),
         base=R_NEUTRAL.copy(),
         bounded=tuple(j == HIP_ROTATION for j in range(7)),
         start_sd=np.array([ABOUT_UP if axis == UP else TILTS for axis in LEG_AXES]),

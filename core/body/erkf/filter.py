@@ -179,8 +179,8 @@ def erkf_inputs(
                 sensor=name,
             )
     acc, gyr = bridge_gaps(tree, acc, gyr, valid, rate_hz)
-    known = find_rests(tree, lambda i: (acc[:, i], gyr[:, i]), valid, rate_hz)
-    return replace(known, acc=acc, gyr=gyr, heading=heading)
+    inputs = find_rests(tree, lambda i: (acc[:, i], gyr[:, i]), valid, rate_hz)
+    return replace(inputs, acc=acc, gyr=gyr, heading=heading)
 
 
 def find_rests(
@@ -247,8 +247,8 @@ class ErkfPass:
         """
         if broke >= 0 or not _positive(self.memory.P[:, : len(self.memory.P)]):
             step = self.samples.step
-            at = broke if broke >= 0 else len(step) - 1
-            at_s = before_s + step[: at + 1].sum()
+            last = broke if broke >= 0 else len(step) - 1
+            at_s = before_s + step[: last + 1].sum()
             raise EstimationError(
                 "filter_diverged",
                 Message(
@@ -270,8 +270,8 @@ def prepare_run(
     rate = 1.0 / np.median(inputs.step_s[inputs.step_s > 0.0]) if np.any(inputs.step_s > 0.0) else 1.0
     flags = np.zeros((T, n), np.uint8)
     patched = () if inputs.patched is None else ((PATCHED, inputs.patched),)
-    for bit, told in ((INVALID, ~inputs.valid), (CONTACT, inputs.contact), (STILL, inputs.still), *patched):
-        flags[told] |= bit
+    for bit, mask in ((INVALID, ~inputs.valid), (CONTACT, inputs.contact), (STILL, inputs.still), *patched):
+        flags[mask] |= bit
     samples = ErkfSamples(
         np.ascontiguousarray(inputs.step_s),
         np.ascontiguousarray(inputs.acc),
@@ -424,8 +424,8 @@ def _check(state: ErkfState, inputs: ErkfInputs, tree: ImuTree, params: ErkfPara
         raise SignalError(
             "bad_signal", "ErKF: non-finite samples; hold the last one and mark it not valid (erkf_inputs)."
         )
-    others = [i for i in range(len(tree.imus)) if i not in tree.feet]
-    if np.asarray(inputs.contact)[:, others].any():
+    non_feet = [i for i in range(len(tree.imus)) if i not in tree.feet]
+    if np.asarray(inputs.contact)[:, non_feet].any():
         raise ParameterError(
             "bad_contact", "ErKF: a contact of an IMU that is no foot; name it among the tree's feet."
         )

@@ -31,15 +31,15 @@ NEVER_LOST: Final = -(2**62)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
-def _mean_up(ring, seen, out):  # type: ignore[no-untyped-def]
-    """Write the direction of the mean of the last `seen` specific forces in a ring buffer (W, 3); NaN for
+def _mean_up(ring, count, out):  # type: ignore[no-untyped-def]
+    """Write the direction of the mean of the last `count` specific forces in a ring buffer (W, 3); NaN for
     zeros.
     """
     W = ring.shape[0]
-    first = seen - min(seen, W)
+    first = count - min(count, W)
     for c in range(3):
         total = 0.0
-        for k in range(first, seen):
+        for k in range(first, count):
             total += ring[k % W, c]
         out[c] = total
     length = np.sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
@@ -49,9 +49,9 @@ def _mean_up(ring, seen, out):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _bridge(  # type: ignore[no-untyped-def]
-    acc, gyr, valid, excess, bias, hold, guide, carry, along, held, lost, seen, ring, up, out_acc, out_gyr
+    acc, gyr, valid, excess, bias, hold, guide, carry, along, held, lost, count, ring, up, out_acc, out_gyr
 ):
-    """Correct and bridge a block; `held`, `lost`, `seen`, `ring` and `up` are advanced in place.
+    """Correct and bridge a block; `held`, `lost`, `count`, `ring` and `up` are advanced in place.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _bridge(  # type: ignore[no-untyped-def]
             else:
                 lost[i] += 1
                 if lost[i] == 1:
-                    _mean_up(ring[i], seen[0], up[i])
+                    _mean_up(ring[i], count[0], up[i])
         for i in range(n):
             for c in range(3):
                 out_acc[k, i, c], out_gyr[k, i, c] = held[i, c], held[i, 3 + c]
@@ -85,7 +85,7 @@ def _bridge(  # type: ignore[no-untyped-def]
                     break
                 if not valid[k, j]:
                     continue
-                _mean_up(ring[j], seen[0], level)
+                _mean_up(ring[j], count[0], level)
                 turn = held[j, 3] * level[0] + held[j, 4] * level[1] + held[j, 5] * level[2]
                 for c in range(3):
                     out_gyr[k, i, c] = turn * up[i, c]
@@ -97,11 +97,11 @@ def _bridge(  # type: ignore[no-untyped-def]
                         f += along[i, c, e] * held[j, e]
                         w += along[i, c, e] * held[j, 3 + e]
                     out_acc[k, i, c], out_gyr[k, i, c] = f, w
-        slot = seen[0] % ring.shape[1]
+        slot = count[0] % ring.shape[1]
         for i in range(n):
             for c in range(3):
                 ring[i, slot, c] = held[i, c]
-        seen[0] += 1
+        count[0] += 1
 
 
 class GapBridge:
@@ -124,8 +124,8 @@ class GapBridge:
         self._along = np.tile(np.eye(3), (n, 1, 1))
         mount = to_matrix(tree.q_mount)
         for i in range(n):
-            found = list_guides(tree, i)
-            self._guide[i, : len(found)] = found
+            guides = list_guides(tree, i)
+            self._guide[i, : len(guides)] = guides
             j = find_carrier(tree, i)
             if j is not None:
                 self._carry[i] = j
@@ -192,12 +192,12 @@ def list_guides(tree: ImuTree, i: int) -> list[int]:
     The closer to the trunk, the smaller the tilt, and the better the rate about the mean vertical reflects
     the turning of the person. For the trunk itself the sensors attached to it are the guides.
     """
-    found: list[int] = []
-    at = i
-    while above := [j.proximal for j in tree.joints if j.distal == at]:
-        at = above[0]
-        found.append(at)
-    return found or [j.distal for j in tree.joints if j.proximal == i]
+    guides: list[int] = []
+    current = i
+    while parents := [j.proximal for j in tree.joints if j.distal == current]:
+        current = parents[0]
+        guides.append(current)
+    return guides or [j.distal for j in tree.joints if j.proximal == i]
 
 
 def find_carrier(tree: ImuTree, i: int) -> int | None:

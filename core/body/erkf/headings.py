@@ -135,19 +135,19 @@ def heading_errors(
     tree = person_tree(body, mounts, segments)
     inputs = erkf_inputs(tree, *correct_signals(calibrated, segments, part), rate)
     q = np.stack([multiply(orientations.q[s][first], from_matrix(mounts[s])) for s in segments])
-    rest = (0, zero.stop - first) if zero.start == first else None
+    standing = (0, zero.stop - first) if zero.start == first else None
     coarse = replace(params, states=9)
-    track, _ = smooth(start_state(tree, inputs, coarse, rest, q=q), inputs, tree, coarse)
+    track, _ = smooth(start_state(tree, inputs, coarse, standing, q=q), inputs, tree, coarse)
     walking = np.zeros(n, bool)
     for window in calibrated.calibration.walking:
         walking[index_window(window, rate)] = True
     change = []
     for i, segment in enumerate(segments):
         was, now = orientations.q[segment][part], tree.segment(i, track.places[i], track.turns[i])[0]
-        seen = walking[part] & orientations.valid[segment][part]
-        if not seen.any():
+        mask = walking[part] & orientations.valid[segment][part]
+        if not mask.any():
             return {}
-        change.append(np.angle(np.mean(np.exp(1j * (yaw(now) - yaw(was)))[seen])))
+        change.append(np.angle(np.mean(np.exp(1j * (yaw(now) - yaw(was)))[mask])))
     apart = np.array([wrap_angle(float(x - change[0])) for x in change])
     return dict(zip(segments, (apart - np.median(apart)).tolist(), strict=True))
 

@@ -43,32 +43,32 @@ beyond up to 16° stay for a take (simulation, one sensor the wrong way round)."
 def erkf_health(run: ErkfRun) -> tuple[HealthFinding, ...]:
     """Judge a run by its own diagnostics: joints, zero velocities, data loss, height, covariance."""
     rate = 1.0 / float(np.median(run.inputs.step_s[run.inputs.step_s > 0.0]))
-    valid, found = run.inputs.valid, []
+    valid, findings = run.inputs.valid, []
     moving = ~run.inputs.still.all(axis=1)
     for k, joint in enumerate(run.tree.joints):
-        both = valid[:, joint.proximal] & valid[:, joint.distal] & moving
-        residual = run.track.joint_residual[both, k]
+        both_valid = valid[:, joint.proximal] & valid[:, joint.distal] & moving
+        residual = run.track.joint_residual[both_valid, k]
         value = 1e3 * float(np.sqrt(np.mean(residual**2))) if len(residual) else float("nan")
-        found.append(HealthFinding("joint_residual_mm", joint.name, value, *RESIDUAL_MM))
+        findings.append(HealthFinding("joint_residual_mm", joint.name, value, *RESIDUAL_MM))
     for i in run.tree.feet:
         name, contact = run.tree.imus[i], run.inputs.contact[:, i]
         refused = 100.0 * run.track.refused[contact, i].mean() if contact.any() else 0.0
-        found.append(HealthFinding("zero_velocity_refused_pct", name, float(refused), *REFUSED_PCT))
-        found.append(HealthFinding("contact_pct", name, 100.0 * float(contact.mean())))
-        found.append(
+        findings.append(HealthFinding("zero_velocity_refused_pct", name, float(refused), *REFUSED_PCT))
+        findings.append(HealthFinding("contact_pct", name, 100.0 * float(contact.mean())))
+        findings.append(
             HealthFinding("longest_moving_s", name, longest_run_s(~contact, rate), *LONGEST_MOVING_S)
         )
         if contact.any():
-            found.append(HealthFinding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
+            findings.append(HealthFinding("climb_pct", name, _climb_pct(run, i), warn=CLIMB_PCT))
     for i, name in enumerate(run.tree.imus):
         lost = longest_run_s(~valid[:, i], rate)
         if lost > 0.0:
-            found.append(HealthFinding("gap_s", name, lost, warn=GAP_S))
+            findings.append(HealthFinding("gap_s", name, lost, warn=GAP_S))
     if run.tree.joints:
-        found.append(_start_heading(run))
-    found.append(HealthFinding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
-    found.append(HealthFinding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
-    return tuple(found)
+        findings.append(_start_heading(run))
+    findings.append(HealthFinding("heading_sd_deg", None, float(np.degrees(run.track.heading_sd[-1].max()))))
+    findings.append(HealthFinding("min_eigenvalue", None, float(np.linalg.eigvalsh(run.final.P)[0])))
+    return tuple(findings)
 
 
 TOLD: Final[Mapping[str, tuple[str, Severity, str]]] = {
@@ -131,15 +131,17 @@ STARTED_MOVING: Final = (
 
 def erkf_notices(run: ErkfRun, findings: tuple[HealthFinding, ...]) -> tuple[Notice, ...]:
     """Notices for the user on the health of the run."""
-    told = []
+    notices = []
     for f in findings:
         if f.verdict != "good" and f.name in TOLD:
             code, severity, words = TOLD[f.name]
             message = Message(words, of=f.of, value=f.value, warn=f.warn)
-            told.append(Notice(code, message, sensor=(f.of or "").split("-")[-1] or None, severity=severity))
+            notices.append(
+                Notice(code, message, sensor=(f.of or "").split("-")[-1] or None, severity=severity)
+            )
     if run.rest is None:
-        told.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))
-    return tuple(told)
+        notices.append(Notice("started_moving", STARTED_MOVING, t_s=0.0))
+    return tuple(notices)
 
 
 def _start_heading(run: ErkfRun) -> HealthFinding:

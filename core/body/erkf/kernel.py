@@ -167,10 +167,10 @@ def is_within_gate(P, b, v, sd, gate):  # type: ignore[no-untyped-def]
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-def]
     """Propagate all IMUs and the covariance to sample k; F (n, 5, 3, 3) is retained."""
-    x, before, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
+    x, previous, dx, acc, gyr = memory.x, memory.before, memory.dx, samples.acc, samples.gyr
     R, vectors, m, dt = scratch.R, scratch.vectors, noise.m, samples.step[k]
     for i in range(F.shape[0]):
-        move(x[i], before[i], acc[k, i], gyr[k, i], dt, noise.first, R[i], F[i], vectors)
+        move(x[i], previous[i], acc[k, i], gyr[k, i], dt, noise.first, R[i], F[i], vectors)
         reset_before(F[i], dx[i * m + 6 : i * m + 9])
     propagate(memory.P, F, m, dt)
 
@@ -178,13 +178,13 @@ def predict(memory, samples, k, noise, scratch, F):  # type: ignore[no-untyped-d
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
 def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-def]
     """Add the process noise of sample k, with its diagonal in Q (N,), and make it the previous sample."""
-    P, before, dt = memory.P, memory.before, samples.step[k]
+    P, previous, dt = memory.P, memory.before, samples.step[k]
     acc, gyr, flags, sd = samples.acc, samples.gyr, samples.flags, links.sd
-    for i in range(before.shape[0]):
+    for i in range(previous.shape[0]):
         b = i * noise.m
         jump = 0.0
         for c in range(3):
-            jump += (acc[k, i, c] - before[i, c]) ** 2
+            jump += (acc[k, i, c] - previous[i, c]) ** 2
         va = sd[i, 0] ** 2 + noise.impact**2 * jump
         vw = sd[i, 1] ** 2
         if flags[k, i] & INVALID:
@@ -195,8 +195,8 @@ def add_noise(memory, samples, k, links, noise, Q):  # type: ignore[no-untyped-d
             Q[b + c], Q[b + 3 + c], Q[b + 6 + c] = 0.0, va * dt * dt, vw * dt * dt
             if noise.m == 15:
                 Q[b + 9 + c], Q[b + 12 + c] = noise.gyr_walk**2 * dt, noise.acc_walk**2 * dt
-            before[i, c] = acc[k, i, c]
-            before[i, 3 + c] = gyr[k, i, c]
+            previous[i, c] = acc[k, i, c]
+            previous[i, 3 + c] = gyr[k, i, c]
     for r in range(P.shape[0]):
         P[r, r] += Q[r]
 
@@ -209,9 +209,9 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
     All are judged from the predicted state, before any block, so that the order does not matter.
     """
     P, x, count = memory.P, memory.x, memory.refused
-    flags, taken, sd = samples.flags[k], scratch.taken, scratch.zero_velocity
+    flags, accepted, sd = samples.flags[k], scratch.taken, scratch.zero_velocity
     for i in range(flags.shape[0]):
-        taken[i] = False
+        accepted[i] = False
         refused[i] = False
         if not flags[i] & CONTACT or noise.zero_velocity < 0.0:
             count[i] = 0
@@ -220,11 +220,11 @@ def judge_contacts(memory, samples, k, noise, scratch, Q, refused):  # type: ign
         sd[i] = noise.zero_velocity
         if samples.rolling.shape[0] > 0:
             sd[i] = np.sqrt(sd[i] ** 2 + (noise.roll_m * samples.rolling[k, i]) ** 2)
-        taken[i] = noise.gate < 0.0 or is_within_gate(P, b, v, sd[i], noise.gate)
-        refused[i] = not taken[i]
-        count[i] = 0 if taken[i] else count[i] + 1
+        accepted[i] = noise.gate < 0.0 or is_within_gate(P, b, v, sd[i], noise.gate)
+        refused[i] = not accepted[i]
+        count[i] = 0 if accepted[i] else count[i] + 1
         if count[i] >= noise.reaccept:
-            taken[i] = True
+            accepted[i] = True
             speed2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
             for c in range(3):
                 P[b + c, b + c] += noise.reaccept_m**2
@@ -347,37 +347,37 @@ def advance(  # type: ignore[no-untyped-def]
 @inner_njit(**UNCOUNTED)
 def keep_state(memory, row):  # type: ignore[no-untyped-def]
     """Write the state into one row (`row_length`); of P only the lower triangle."""
-    x, before, P, at = memory.x, memory.before, memory.P, 0
+    x, previous, P, offset = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
-            row[at + c] = x[i, c]
+            row[offset + c] = x[i, c]
         for c in range(6):
-            row[at + 16 + c] = before[i, c]
-        row[at + 22] = memory.refused[i]
-        at += 23
+            row[offset + 16 + c] = previous[i, c]
+        row[offset + 22] = memory.refused[i]
+        offset += 23
     for r in range(P.shape[0]):
-        row[at] = memory.dx[r]
+        row[offset] = memory.dx[r]
         for c in range(r + 1):
-            row[at + 1 + c] = P[r, c]
-        at += r + 2
+            row[offset + 1 + c] = P[r, c]
+        offset += r + 2
 
 
 @inner_njit(**UNCOUNTED)
 def restore_state(memory, row):  # type: ignore[no-untyped-def]
     """Inverse of `keep_state`; the upper triangle of P is left unchanged."""
-    x, before, P, at = memory.x, memory.before, memory.P, 0
+    x, previous, P, offset = memory.x, memory.before, memory.P, 0
     for i in range(x.shape[0]):
         for c in range(16):
-            x[i, c] = row[at + c]
+            x[i, c] = row[offset + c]
         for c in range(6):
-            before[i, c] = row[at + 16 + c]
-        memory.refused[i] = int(row[at + 22])
-        at += 23
+            previous[i, c] = row[offset + 16 + c]
+        memory.refused[i] = int(row[offset + 22])
+        offset += 23
     for r in range(P.shape[0]):
-        memory.dx[r] = row[at]
+        memory.dx[r] = row[offset]
         for c in range(r + 1):
-            P[r, c] = row[at + 1 + c]
-        at += r + 2
+            P[r, c] = row[offset + 1 + c]
+        offset += r + 2
 
 
 def row_length(n: int, N: int) -> int:
@@ -387,7 +387,7 @@ def row_length(n: int, N: int) -> int:
 
 @numba.njit(cache=True, nogil=True, no_cfunc_wrapper=True)  # type: ignore[misc, unused-ignore]
 def filter_segments(  # type: ignore[no-untyped-def]
-    memory, samples, links, noise, record, output, kept, segment, smoothing, lam,
+    memory, samples, links, noise, record, output, states, segment, smoothing, lam,
 ):  # fmt: skip
     """Filter a block, `memory` in place; returns the sample at which the covariance failed, or −1.
 
@@ -397,7 +397,7 @@ def filter_segments(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    kept : (S, `row_length`) the state before each segment of this many samples, written, or with smoothing
+    states : (S, `row_length`) the state before each segment of this many samples, written, or with smoothing
         read. No rows: the block is one segment, and no state is retained.
     record : with room for one sample, or with smoothing for a segment.
     smoothing : filter each segment again from its row, the last first, and smooth it.
@@ -415,16 +415,16 @@ def filter_segments(  # type: ignore[no-untyped-def]
         np.empty((n, 3, 3)), np.empty((record.V.shape[1] + 1, 3, 3)), np.empty(3), np.empty((10, 3)),
         np.zeros(n, np.bool_), np.empty(n), np.empty(J),
     )  # fmt: skip
-    length = segment if kept.shape[0] > 0 else T
+    length = segment if states.shape[0] > 0 else T
     adjoint = lam, np.empty(N), np.empty((length if smoothing else 0, N))
     return run_segments(
-        memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint
+        memory, samples, links, noise, record, output, states, length, smoothing, scratch, adjoint
     )
 
 
 @inner_njit(**UNCOUNTED)
 def run_segments(  # type: ignore[no-untyped-def]
-    memory, samples, links, noise, record, output, kept, length, smoothing, scratch, adjoint,
+    memory, samples, links, noise, record, output, states, length, smoothing, scratch, adjoint,
 ):  # fmt: skip
     """`filter_segments` with work arrays provided by the caller.
 
@@ -433,16 +433,16 @@ def run_segments(  # type: ignore[no-untyped-def]
     adjoint : λ (N,) as in `filter_segments`, d (N,), `swept` (K, N).
     """
     n, N, T = memory.x.shape[0], memory.P.shape[0], samples.step.shape[0]
-    keeps = kept.shape[0] > 0
-    segments = kept.shape[0] if keeps else 1
+    keeps = states.shape[0] > 0
+    segments = states.shape[0] if keeps else 1
     lam, d, swept = adjoint
     for i in range(segments):
         s = segments - 1 - i if smoothing else i
         a, b = s * length, min((s + 1) * length, T)
         if smoothing:
-            restore_state(memory, kept[s])
+            restore_state(memory, states[s])
         elif keeps:
-            keep_state(memory, kept[s])
+            keep_state(memory, states[s])
         for k in range(a, b):
             slot = k - a if smoothing else 0
             if not advance(memory, samples, k, links, noise, scratch, record, slot, output, k - a):
@@ -453,7 +453,7 @@ def run_segments(  # type: ignore[no-untyped-def]
             step, nominal = samples.step[a:b], output.nominal[: b - a]
             sweep_back(lam, step, record, noise.m, swept)
             # the covariance is again that before the segment
-            restore_state(memory, kept[s])
+            restore_state(memory, states[s])
             multiply_lower(memory.P, lam, d)
             move_smoothed(d, step, record, noise.m, swept, nominal)
             measure_smoothed(nominal, links, scratch, output.residual[a:b])

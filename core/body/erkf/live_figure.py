@@ -23,36 +23,36 @@ LEVEL_S: Final = 0.1
 def _level(p, feet, still, valid, ankle, share, floor):  # type: ignore[no-untyped-def]
     """Subtract the floor height, determined by the resting feet, from positions p (T, n, 3) in place."""
     for k in range(p.shape[0]):
-        seen, count = 0.0, 0
+        heights, count = 0.0, 0
         for f in range(feet.shape[0]):
             if still[k, f] and valid[k, f]:
-                seen += p[k, feet[f], 2] - ankle
+                heights += p[k, feet[f], 2] - ankle
                 count += 1
         if count:
-            floor[0] += share * (seen / count - floor[0])
+            floor[0] += share * (heights / count - floor[0])
         for i in range(p.shape[1]):
             p[k, i, 2] -= floor[0]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _tell(q, p, valid, still, feet, shown, known, whole, foot_q, foot_p, stands, there):  # type: ignore[no-untyped-def]
+def _tell(q, p, valid, still, feet, displayed, known, whole, foot_q, foot_p, stands, available):  # type: ignore[no-untyped-def]
     """Write the validity of segments q (T, n, 4), p (T, n, 3), and the paths of the feet.
 
     Parameters
     ----------
-    valid, still : (T, n), (T, n, 2) of the sensors. feet, shown : columns of the feet, of the displayed
+    valid, still : (T, n), (T, n, 2) of the sensors. feet, displayed : columns of the feet, of the displayed
         segments. known : (T, n) written. whole : (T,) written, all displayed segments are known.
-    foot_q, foot_p, stands, there : (T, F, ·) written, as `FootBlock`.
+    foot_q, foot_p, stands, available : (T, F, ·) written, as `FootBlock`.
     """
     for k in range(q.shape[0]):
         for i in range(q.shape[1]):
             known[k, i] = valid[k, i] and np.isfinite(q[k, i, 0])
         whole[k] = True
-        for i in shown:
+        for i in displayed:
             whole[k] = whole[k] and known[k, i]
         for f in range(feet.shape[0]):
             i = feet[f]
-            stands[k, f], there[k, f] = still[k, i, 0], known[k, i]
+            stands[k, f], available[k, f] = still[k, i, 0], known[k, i]
             for c in range(4):
                 foot_q[k, f, c] = q[k, i, c]
             for c in range(3):
@@ -74,8 +74,8 @@ class LinkedBody:
         feet = list_worn_feet(segments)
         self._feet = np.array([self.segments.index(f) for f in feet], np.int64)
         legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(segments)]
-        shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
-        self._shown = np.array([self.segments.index(s) for s in shown], np.int64)
+        displayed: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
+        self._shown = np.array([self.segments.index(s) for s in displayed], np.int64)
         self.linked = len(feet) == 2 and not (set(self._feet.tolist()) & set(tree.roots()))
         self.source = LIVE_LINKED_PATHS if self.linked else LIVE_SINGLE_PATHS
         self._watch, self._notices = JointWatch(tree, rate_hz), list[Notice]()
@@ -92,18 +92,18 @@ class LinkedBody:
         signals, q, p = tracked.signals, tracked.q, tracked.p
         self._notices += self._watch.push(tracked.residual, signals.valid, signals.still)
         T, n = signals.valid.shape
-        known, whole = np.empty((T, n), np.bool_), np.empty(T, np.bool_)
+        is_known, whole = np.empty((T, n), np.bool_), np.empty(T, np.bool_)
         F = len(self._feet)
         paths = FootBlock(
             np.empty((T, F, 3)), np.empty((T, F, 4)), np.empty((T, F), np.bool_), np.empty((T, F), np.bool_),
             (signals.patched & ~signals.still[:, :, 0]).take(self._feet, axis=1),
         )  # fmt: skip
         _tell(
-            q, p, signals.valid, signals.still, self._feet, self._shown, known, whole, paths.q, paths.p,
+            q, p, signals.valid, signals.still, self._feet, self._shown, is_known, whole, paths.q, paths.p,
             paths.still, paths.valid,
         )  # fmt: skip
         _level(p, self._feet, paths.still, paths.valid, self._ankle, self._share, self._floor)
-        return BodyBlock(q, p, known, whole, paths)
+        return BodyBlock(q, p, is_known, whole, paths)
 
     def drain_notices(self) -> list[Notice]:
         """Notices on joints whose ends are too far apart."""

@@ -28,10 +28,10 @@ def _watch(residual, valid, still, ends, window, total, count, worst):  # type: 
     """
     full = False
     for k in range(residual.shape[0]):
-        rest = True
+        at_rest = True
         for i in range(valid.shape[1]):
-            rest &= still[k, i, 1]
-        if rest:
+            at_rest &= still[k, i, 1]
+        if at_rest:
             continue
         for j in range(ends.shape[0]):
             if not (valid[k, ends[j, 0]] and valid[k, ends[j, 1]]):
@@ -58,17 +58,17 @@ class JointWatch:
 
     def push(self, residual: Floats, valid: Bools, still: Bools) -> list[Notice]:
         """Process distances (T, J) in m, valid (T, n), still (T, n, 2)."""
-        given = residual, valid, still, self._ends, self._window, self._total, self._count, self._worst
-        if not _watch(*given):
+        arguments = residual, valid, still, self._ends, self._window, self._total, self._count, self._worst
+        if not _watch(*arguments):
             return []
         far = (1e3 * np.sqrt(self._worst) > RESIDUAL_MM[0]) & ~self._told
         if not far.any():
             return []
         self._told |= far
         code, severity, words = TOLD["joint_residual_mm"]
-        found = []
+        notices = []
         for j in np.flatnonzero(far):
             name, apart = self._joints[j].name, 1e3 * float(np.sqrt(self._worst[j]))
             message = Message(words, of=name, value=apart, warn=RESIDUAL_MM[0])
-            found.append(Notice(code, message, sensor=name.split("-")[-1], severity=severity))
-        return found
+            notices.append(Notice(code, message, sensor=name.split("-")[-1], severity=severity))
+        return notices

@@ -97,7 +97,7 @@ def run_erkf(
     rate = calibrated.recording.rate_hz
     inputs = _find_inputs(tree, calibrated, segments, params)
     first = np.stack([multiply(orientations.q[s][0], from_matrix(mounts[s])) for s in segments])
-    rest = next(
+    standing = next(
         (
             (round(a * rate), round(b * rate))
             for a, b in calibrated.calibration.rest
@@ -108,9 +108,9 @@ def run_erkf(
     # without a standing start the biases still come from the calibration's rest, wherever that is
     age_s = calibrated.calibration.zero[0] if calibrated.calibration.posture == "standing" else None
     # orientations are known: of the signals it takes the first sample
-    start = start_state(tree, inputs.part(0, 1), params, rest, q=first, bias_age_s=age_s)
+    start = start_state(tree, inputs.part(0, 1), params, standing, q=first, bias_age_s=age_s)
     track, final = smooth(start, inputs, tree, params, filtered=filtered)
-    return ErkfRun(tree, replace(inputs.known, rolling=None), start, rest, track, final)
+    return ErkfRun(tree, replace(inputs.known, rolling=None), start, standing, track, final)
 
 
 def _find_inputs(
@@ -132,8 +132,8 @@ def _find_inputs(
         return acc[:, 0], gyr[:, 0]
 
     acc, gyr = (CorrectedSignals(calibrated, segments, name) for name in SIGNALS)
-    known = find_rests(tree, of_sensor, valid, recording.rate_hz)
-    return TakeInputs(replace(known, patched=patched), acc, gyr)
+    inputs = find_rests(tree, of_sensor, valid, recording.rate_hz)
+    return TakeInputs(replace(inputs, patched=patched), acc, gyr)
 
 
 def find_patches(recording: UniformRecording, segments: Sequence[Segment], longest_s: float) -> Bools:
@@ -179,8 +179,8 @@ def replace_orientations(
     run: ErkfRun, orientations: Orientations, tracks: SegmentTracks | None = None
 ) -> Orientations:
     """The given orientations with those of the run's segments replaced."""
-    found = (tracks or find_segment_tracks(run)).q
-    return replace(orientations, q={**orientations.q, **found}, engine=ERKF.method)
+    orientations_by_segment = (tracks or find_segment_tracks(run)).q
+    return replace(orientations, q={**orientations.q, **orientations_by_segment}, engine=ERKF.method)
 
 
 def place_figure(
@@ -201,13 +201,13 @@ def place_figure(
     orientations : as refined by this run.
     """
     legs = [s for s in SIDES if {THIGH[s], SHANK[s], FOOT[s]} <= set(run.segments)]
-    shown: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
+    displayed: list[Segment] = ["pelvis", *(x for s in legs for x in (THIGH[s], SHANK[s], FOOT[s]))]
     still = {s: run.inputs.contact[:, run.segments.index(FOOT[s])] for s in legs}
     floor = _floor({s: tracks.p[FOOT[s]][:, 2] - body.ankle_height for s in legs}, still)
-    level = {s: np.empty((len(floor), 3), figure_precision(len(floor))) for s in shown}
+    level = {s: np.empty((len(floor), 3), figure_precision(len(floor))) for s in displayed}
     for part in cut_blocks(len(floor)):
-        place = {s: tracks.p[s][part] for s in shown}
-        turned = {s: orientations.q[s][part] for s in shown}
+        place = {s: tracks.p[s][part] for s in displayed}
+        turned = {s: orientations.q[s][part] for s in displayed}
         for side in legs:
             place |= _hang_together(run, turned, place, side, body)
         for s, p in place.items():
@@ -216,9 +216,9 @@ def place_figure(
     return Poses(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        q={s: orientations.q[s] for s in shown},
+        q={s: orientations.q[s] for s in displayed},
         p=level,
-        valid=np.logical_and.reduce([orientations.valid[s] for s in shown]),
+        valid=np.logical_and.reduce([orientations.valid[s] for s in displayed]),
         contact={FOOT[s]: contacts.get(s, still[s]) for s in legs},
         body=body,
         method=ERKF.method,
@@ -235,20 +235,24 @@ def foot_tracks(
     ----------
     orientations : as refined by this run.
     """
-    at: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
+    columns: dict[Side, int] = {s: run.segments.index(FOOT[s]) for s in SIDES if FOOT[s] in run.segments}
     patched, paths = run.inputs.patched, (tracks or find_segment_tracks(run)).p
-    linked = len(at) == 2 and not ({FOOT[s] for s in at} & {run.segments[i] for i in run.tree.roots()})
+    linked = len(columns) == 2 and not (
+        {FOOT[s] for s in columns} & {run.segments[i] for i in run.tree.roots()}
+    )
     return FootTracks(
         t_s=orientations.t_s,
         rate_hz=orientations.rate_hz,
-        p={s: paths[FOOT[s]] for s in at},
-        q={s: orientations.q[FOOT[s]] for s in at},
-        still={s: run.inputs.contact[:, i] for s, i in at.items()},
-        valid={s: orientations.valid[FOOT[s]] for s in at},
+        p={s: paths[FOOT[s]] for s in columns},
+        q={s: orientations.q[FOOT[s]] for s in columns},
+        still={s: run.inputs.contact[:, i] for s, i in columns.items()},
+        valid={s: orientations.valid[FOOT[s]] for s in columns},
         patched={}
         if patched is None
-        else {s: patched[:, i] & ~run.inputs.contact[:, i] for s, i in at.items()},
-        sensor_ahead={s: float(run.tree.place[i, 0] - sensor_place(FOOT[s], body)[0]) for s, i in at.items()},
+        else {s: patched[:, i] & ~run.inputs.contact[:, i] for s, i in columns.items()},
+        sensor_ahead={
+            s: float(run.tree.place[i, 0] - sensor_place(FOOT[s], body)[0]) for s, i in columns.items()
+        },
         linked=linked,
         source=LINKED_PATHS if linked else SINGLE_PATHS,
         body=body,
@@ -278,15 +282,15 @@ def _hang_together(
     return moved
 
 
-def _floor(above: Mapping[Side, Floats], still: Mapping[Side, Bools]) -> Floats:
+def _floor(ankle_heights: Mapping[Side, Floats], still: Mapping[Side, Bools]) -> Floats:
     """Height (n,) of the floor estimated by the run: that of the feet at rest, linear in between."""
-    n = len(next(iter(above.values())))
-    seen = np.zeros(n)
+    n = len(next(iter(ankle_heights.values())))
+    heights = np.zeros(n)
     count = np.zeros(n)
-    for side, height in above.items():
-        seen += np.where(still[side], height, 0.0)
+    for side, height in ankle_heights.items():
+        heights += np.where(still[side], height, 0.0)
         count += still[side]
     index = np.flatnonzero(count)
     if not len(index):
         return np.zeros(n)
-    return np.interp(np.arange(n), index, seen[index] / count[index])
+    return np.interp(np.arange(n), index, heights[index] / count[index])

@@ -35,7 +35,7 @@ A, S, D, GAMMA, C = range(5)
 
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
-def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
+def move(x, previous, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-untyped-def]
     """Advance one IMU's nominal state x (16,) and write its blocks F (5, 3, 3) and new matrix R (3, 3).
 
     `first` is the weight of the sample at the start of the step: 1 Euler (eq 8), ½ trapezoid. F is the exact
@@ -46,8 +46,8 @@ def move(x, before, acc, gyr, dt, first, R, F, scratch):  # type: ignore[no-unty
     start, turned = scratch[4:7], scratch[7:10]
     last = 1.0 - first
     for i in range(3):
-        phi[i] = (first * before[3 + i] + last * gyr[i] - x[10 + i]) * dt
-        f0[i] = first * (before[i] - x[13 + i])
+        phi[i] = (first * previous[3 + i] + last * gyr[i] - x[10 + i]) * dt
+        f0[i] = first * (previous[i] - x[13 + i])
         f1[i] = last * (acc[i] - x[13 + i])
     to_matrix(x[6:10], start)
     turn(x[6:10], phi[0], phi[1], phi[2])

@@ -69,8 +69,8 @@ def smooth(
     ------
     EstimationError `filter_diverged` as in `filter_block`.
     """
-    known = inputs.known if isinstance(inputs, TakeInputs) else inputs
-    T, n = known.valid.shape
+    signals = inputs.known if isinstance(inputs, TakeInputs) else inputs
+    T, n = signals.valid.shape
     if segment is None:
         segment = max(SEGMENT, math.isqrt(T // 4))
     if segment < 2:
@@ -81,13 +81,15 @@ def smooth(
     at_once = max(1, AT_ONCE // segment)
     blocks = [(first, min(first + at_once, whole)) for first in range(0, whole, at_once)]
     record, lam, final = tuple(new_record(tree, params, 1)), np.zeros(N), state
-    kept = []
+    checkpoints = []
     for first, past in blocks:
         run = prepare_run(final, inputs.part(first * segment, past * segment), tree, params, segment)
         # each block's go while the smoothed states grow
-        kept.append(make_pages(past - first, row_length(n, N)))
-        broke = filter_segments(*run.arguments(), record, tuple(run.output), kept[-1], segment, False, lam)
-        final = run.end(broke, float(known.step_s[: first * segment].sum()))
+        checkpoints.append(make_pages(past - first, row_length(n, N)))
+        broke = filter_segments(
+            *run.arguments(), record, tuple(run.output), checkpoints[-1], segment, False, lam
+        )
+        final = run.end(broke, float(signals.step_s[: first * segment].sum()))
     filtered()
     places, turns = (tuple(np.empty((T, k)) for _ in range(n)) for k in (3, 4))
     residual, refused = np.empty((T, len(tree.joints))), np.empty((T, n), np.bool_)
@@ -96,11 +98,11 @@ def smooth(
     for first, past in reversed(blocks):
         part = slice(first * segment, past * segment)
         run = prepare_run(final, inputs.part(part.start, part.stop), tree, params, segment)
-        found = run.output
-        filter_segments(*run.arguments(), record, tuple(found), kept.pop(), segment, True, lam)
+        buffers = run.output
+        filter_segments(*run.arguments(), record, tuple(buffers), checkpoints.pop(), segment, True, lam)
         for i in range(n):
-            places[i][part], turns[i][part] = found.smoothed[:, i, :3], found.smoothed[:, i, 3:]
-        residual[part], refused[part] = found.residual, found.refused
+            places[i][part], turns[i][part] = buffers.smoothed[:, i, :3], buffers.smoothed[:, i, 3:]
+        residual[part], refused[part] = buffers.residual, buffers.refused
         if past == whole:
-            heading_sd = found.heading_sd[-1:].copy()
+            heading_sd = buffers.heading_sd[-1:].copy()
     return ErkfTrack(places, turns, heading_sd, residual, refused, np.empty((0, n, 16))), final

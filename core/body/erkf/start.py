@@ -32,7 +32,7 @@ def start_state(
     tree: ImuTree,
     inputs: ErkfInputs,
     params: ErkfParams,
-    rest: tuple[int, int] | None = None,
+    standing_range: tuple[int, int] | None = None,
     q: Floats | None = None,
     bias_age_s: float | None = None,
 ) -> ErkfState:
@@ -40,8 +40,8 @@ def start_state(
 
     Parameters
     ----------
-    rest : samples start … stop − 1 of quiet standing, beginning close to the first sample; None for a
-        recording that starts mid-walk: tilt and velocity then have a large uncertainty.
+    standing_range : samples start … stop − 1 of quiet standing, beginning close to the first sample; None for
+        a recording that starts mid-walk: tilt and velocity then have a large uncertainty.
     q : (n, 4) sensor orientations at the first sample from another source (an orientation filter); else from
         gravity.
     bias_age_s : for a start mid-walk, time to the rest elsewhere in the recording whose mean rate was
@@ -50,8 +50,8 @@ def start_state(
         (30 mm per stride in a real walk with a rest only at its end).
     """
     n, m = len(tree.imus), params.states
-    standing = rest is not None
-    a, b = rest or (0, max(1, int(np.searchsorted(np.cumsum(inputs.step_s), MOVING_S))))
+    standing = standing_range is not None
+    a, b = standing_range or (0, max(1, int(np.searchsorted(np.cumsum(inputs.step_s), MOVING_S))))
     if q is None:
         q = np.stack(
             [_level(f, x) for f, x in zip(inputs.acc[a:b].mean(axis=0), tree.forward(), strict=True)]

@@ -59,8 +59,8 @@ def second_order_variance(P, R, m, i, j, ri, rj):  # type: ignore[no-untyped-def
     var = 0.0
     for k in range(3):
         for c in range(3):
-            own, other = P[a + max(k, c), a + min(k, c)], P[max(a + k, b + c), min(a + k, b + c)]
-            var += R[i, 2, k] * (own * R[i, 2, c] - 2.0 * other * R[j, 2, c])
+            own, cross = P[a + max(k, c), a + min(k, c)], P[max(a + k, b + c), min(a + k, b + c)]
+            var += R[i, 2, k] * (own * R[i, 2, c] - 2.0 * cross * R[j, 2, c])
             var += R[j, 2, k] * P[b + max(k, c), b + min(k, c)] * R[j, 2, c]
     reach = 0.0
     for k in range(2):
@@ -116,10 +116,10 @@ def complete_rows(P, first):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline="always", **UNCOUNTED)  # type: ignore[misc, unused-ignore]
-def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
+def take_rows(P, place, H, V, U, accepted):  # type: ignore[no-untyped-def]
     """Write H (P − Σ VᵀV) of a block into V[taken], summed over the previous blocks; U[a]: H V[a]ᵀ."""
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
-    new = V[taken]
+    new = V[accepted]
     h, g = H[0], H[1]
     for c in range(0, P.shape[1], STEP):
         if place[TURNS] == 1:
@@ -137,7 +137,7 @@ def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
         else:
             i = b + unit
             n0, n1, n2 = read_lanes(P, i, c), read_lanes(P, i + 1, c), read_lanes(P, i + 2, c)
-        for a in range(taken):
+        for a in range(accepted):
             x, y, z = read_lanes(V[a], 0, c), read_lanes(V[a], 1, c), read_lanes(V[a], 2, c)
             n0 = n0 - mix(U[a], 0, x, y, z)
             n1 = n1 - mix(U[a], 1, x, y, z)
@@ -148,7 +148,7 @@ def take_rows(P, place, H, V, U, taken):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, **UNCOUNTED)  # type: ignore[misc, unused-ignore]
-def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyped-def]
+def take_block(P, dx, place, H, y, sd, V, accepted, E, U):  # type: ignore[no-untyped-def]
     """Accumulate one block in dx, but not yet in P; False if S is not positive definite.
 
     The effect of the previous blocks on P is subtracted from H P: H (P − Σ VᵀV). So P passes through the
@@ -156,49 +156,49 @@ def take_block(P, dx, place, H, y, sd, V, taken, E, U):  # type: ignore[no-untyp
 
     Parameters
     ----------
-    P : before all blocks, with the rows used by H complete (`complete_rows`). taken : number of previous
+    P : before all blocks, with the rows used by H complete (`complete_rows`). accepted : number of previous
     blocks. V (blocks, 3, as P) and E (9,) = (e, L) of this one are kept for the smoother.
     U (> taken, 3, 3) : scratch. y (3,) becomes the residual of the block after dx.
     """
     b, b2, unit = place[FIRST], place[SECOND], place[UNIT]
-    both, turns = b2 >= 0, place[TURNS] == 1
-    for a in range(taken):
+    has_second, turns = b2 >= 0, place[TURNS] == 1
+    for a in range(accepted):
         old = V[a]
         for k in range(3):
             for r in range(3):
-                seen = 0.0
+                total = 0.0
                 if turns:
                     for i in range(3):
-                        seen += H[0, r, i] * old[k, b + 6 + i]
-                        if both:
-                            seen += H[1, r, i] * old[k, b2 + 6 + i]
+                        total += H[0, r, i] * old[k, b + 6 + i]
+                        if has_second:
+                            total += H[1, r, i] * old[k, b2 + 6 + i]
                 if unit >= 0:
-                    seen += old[k, b + unit + r]
-                    if both:
-                        seen -= old[k, b2 + unit + r]
-                U[a, r, k] = seen
-    take_rows(P, place, H, V, U, taken)
-    new, S = V[taken], U[taken]
+                    total += old[k, b + unit + r]
+                    if has_second:
+                        total -= old[k, b2 + unit + r]
+                U[a, r, k] = total
+    take_rows(P, place, H, V, U, accepted)
+    new, S = V[accepted], U[accepted]
     for r in range(3):
         for k in range(3):
             S[r, k] = 0.0
             if turns:
                 for i in range(3):
                     S[r, k] += H[0, k, i] * new[r, b + 6 + i]
-                    if both:
+                    if has_second:
                         S[r, k] += H[1, k, i] * new[r, b2 + 6 + i]
             if unit >= 0:
                 S[r, k] += new[r, b + unit + k]
-                if both:
+                if has_second:
                     S[r, k] -= new[r, b2 + unit + k]
         if turns:
             for i in range(3):
                 y[r] -= H[0, r, i] * dx[b + 6 + i]
-                if both:
+                if has_second:
                     y[r] -= H[1, r, i] * dx[b2 + 6 + i]
         if unit >= 0:
             y[r] -= dx[b + unit + r]
-            if both:
+            if has_second:
                 y[r] += dx[b2 + unit + r]
         S[r, r] += sd * sd
     if not (S[0, 0] > 0.0):

@@ -103,8 +103,8 @@ def write_columns(_: Any, array: Any, row: Any, column: Any, columns: Any) -> An
 
     def make(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         rows = _transpose(builder, cgutils.unpack_tuple(builder, args[3], STEP))
-        for found, place in zip(rows, _find_rows(context, builder, signature, args), strict=True):
-            builder.store(found, place, align=8)
+        for vector, place in zip(rows, _find_rows(context, builder, signature, args), strict=True):
+            builder.store(vector, place, align=8)
         return context.get_dummy_value()
 
     return types.void(array, types.intp, types.intp, _EIGHT), make
@@ -119,17 +119,17 @@ def _find_rows(context: Any, builder: Any, signature: Any, args: Any) -> list[An
 
 def _transpose(builder: Any, rows: Any) -> list[Any]:
     """Transpose eight `Lanes`: rows of a matrix → its columns."""
-    found = list(rows)
+    vectors = list(rows)
     mask = ir.VectorType(ir.IntType(32), STEP)
     for s in (1, 2, 4):
         low = ir.Constant(mask, [STEP + (k ^ s) if k & s else k for k in range(STEP)])
         high = ir.Constant(mask, [STEP + k if k & s else k ^ s for k in range(STEP)])
         for i in range(STEP):
             if not i & s:
-                a, b = found[i], found[i | s]
-                found[i] = builder.shuffle_vector(a, b, low)
-                found[i | s] = builder.shuffle_vector(a, b, high)
-    return found
+                a, b = vectors[i], vectors[i | s]
+                vectors[i] = builder.shuffle_vector(a, b, low)
+                vectors[i | s] = builder.shuffle_vector(a, b, high)
+    return vectors
 
 
 @intrinsic
@@ -141,8 +141,8 @@ def mix(_: Any, M: Any, i: Any, x: Any, y: Any, z: Any) -> Any:
         array = context.make_array(kind)(context, builder, args[0])
         parts = []
         for k, lanes in enumerate(args[2:]):
-            at = (args[1], ir.Constant(args[1].type, k))
-            place = cgutils.get_item_pointer(context, builder, kind, array, at, wraparound=False)
+            indices = (args[1], ir.Constant(args[1].type, k))
+            place = cgutils.get_item_pointer(context, builder, kind, array, indices, wraparound=False)
             parts.append(builder.fmul(_spread(builder, builder.load(place)), lanes))
         return builder.fadd(builder.fadd(parts[0], parts[1]), parts[2])
 

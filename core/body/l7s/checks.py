@@ -76,14 +76,14 @@ class SeenWalk:
             np.empty((samples, 3)) if pelvis else None,
         )
 
-    def put(self, at: slice, block: SeenWalk) -> None:
+    def put(self, part: slice, block: SeenWalk) -> None:
         """Store a block at its samples."""
-        self.step[at], self.forward[at], self.feet[at] = block.step, block.forward, block.feet
+        self.step[part], self.forward[part], self.feet[part] = block.step, block.forward, block.feet
         if self.pelvis is not None:
-            self.pelvis[at] = block.pelvis
+            self.pelvis[part] = block.pelvis
 
 
-def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str, float]:
+def walking_checks(walk: SeenWalk, model: LegModel, rate_hz: float) -> dict[str, float]:
     """Quantities by name; those that cannot be determined from the recording are absent.
 
     Returns
@@ -97,24 +97,24 @@ def walking_checks(seen: SeenWalk, model: LegModel, rate_hz: float) -> dict[str,
     inverted pendulum falls away from its foot); `pelvis_tilt_sd_rad` while moving; `pelvis_rise_m`, largest
     change of its height within a few seconds, which L7S assumes constant.
     """
-    found: dict[str, float] = {}
-    moving = np.asarray(~seen.step.all(axis=1))
-    heading = np.unwrap(np.arctan2(seen.forward[:, 1], seen.forward[:, 0]))
+    checks: dict[str, float] = {}
+    moving = np.asarray(~walk.step.all(axis=1))
+    heading = np.unwrap(np.arctan2(walk.forward[:, 1], walk.forward[:, 0]))
     if moving.any():
         outward = np.empty(len(heading))
         for part in cut_blocks(len(heading)):
             to_left = np.stack((-np.sin(heading[part]), np.cos(heading[part])), axis=1)
-            outward[part] = np.sum(to_left * (seen.feet[part, 0] - seen.feet[part, 1]), axis=1)
+            outward[part] = np.sum(to_left * (walk.feet[part, 0] - walk.feet[part, 1]), axis=1)
         outward = outward[moving]
         low, high = (x * model.hip_width for x in OUTWARD)
-        found["out_of_place_share"] = float(np.mean((outward < low) | (outward > high)))
-    rests = [_rests(seen.step[:, leg], rate_hz) for leg in range(2)]
+        checks["out_of_place_share"] = float(np.mean((outward < low) | (outward > high)))
+    rests = [_rests(walk.step[:, leg], rate_hz) for leg in range(2)]
     phases = _phases(rests[0], rests[1], rate_hz) + _phases(rests[1], rests[0], rate_hz)
     if len(phases) >= LEAST_STRIDES:
-        found["phase_off"] = float(np.median(np.abs(np.array(phases) - 0.5)))
-    if seen.pelvis is not None:
-        return found | _pelvis(seen.pelvis, seen.step, moving, rate_hz)
-    return found | _turns(rests, heading, seen.feet, STRIDE_S[1] * rate_hz)
+        checks["phase_off"] = float(np.median(np.abs(np.array(phases) - 0.5)))
+    if walk.pelvis is not None:
+        return checks | _pelvis(walk.pelvis, walk.step, moving, rate_hz)
+    return checks | _turns(rests, heading, walk.feet, STRIDE_S[1] * rate_hz)
 
 
 def longest_gaps(valid: Mapping[Segment, Bools], rate_hz: float) -> dict[Segment, float]:
@@ -133,12 +133,12 @@ def _rests(step: Bools, rate_hz: float) -> np.ndarray:
     return np.array([(a + b) // 2 for a, b in joined], int)
 
 
-def _phases(own: np.ndarray, other: np.ndarray, rate_hz: float) -> list[float]:
+def _phases(own: np.ndarray, opposite: np.ndarray, rate_hz: float) -> list[float]:
     """Phase of the other foot's rest in each stride of a foot, 0 to 1; 0 without one."""
     phases = []
     for a, b in pairwise(own):
         if STRIDE_S[0] * rate_hz <= b - a <= STRIDE_S[1] * rate_hz:
-            inside = other[(other > a) & (other < b)]
+            inside = opposite[(opposite > a) & (opposite < b)]
             if len(inside) < 2:
                 phases.append(float((inside[0] - a) / (b - a)) if len(inside) else 0.0)
     return phases
@@ -180,13 +180,15 @@ def _see_pelvis(inputs: L7sInputs) -> Floats:
 
 def _pelvis(pelvis: Floats, step: Bools, moving: Bools, rate_hz: float) -> dict[str, float]:
     upwards, sideways, tilt = pelvis.T
-    found = {"pelvis_rise_m": _rise(upwards, rate_hz)}
-    alone = [step[:, leg] & ~step[:, 1 - leg] for leg in range(2)]
-    if alone[0].any() and alone[1].any():
-        found["toward_foot_mps2"] = 0.5 * float(sideways[alone[0]].mean() - sideways[alone[1]].mean())
+    checks = {"pelvis_rise_m": _rise(upwards, rate_hz)}
+    single_support = [step[:, leg] & ~step[:, 1 - leg] for leg in range(2)]
+    if single_support[0].any() and single_support[1].any():
+        checks["toward_foot_mps2"] = 0.5 * float(
+            sideways[single_support[0]].mean() - sideways[single_support[1]].mean()
+        )
     if moving.any():
-        found["pelvis_tilt_sd_rad"] = float(np.std(tilt[moving]))
-    return found
+        checks["pelvis_tilt_sd_rad"] = float(np.std(tilt[moving]))
+    return checks
 
 
 def _rise(vertical: Floats, rate_hz: float) -> float:

@@ -100,12 +100,12 @@ def project(R, p, v, P, lengths, dx, scratch):  # type: ignore[no-untyped-def]
         for k in range(n):
             PC[r, k] = 0.0
         for c in range(0, 12, 6):
-            of = P[:] if c == 0 else P[WIDTH * foot :]
+            block = P[:] if c == 0 else P[WIDTH * foot :]
             e, f, g, h, i, j = C[r, c], C[r, c + 1], C[r, c + 2], C[r, c + 3], C[r, c + 4], C[r, c + 5]
             for k in range(n):
                 PC[r, k] += (
-                    e * of[k] + f * of[WIDTH + k] + g * of[2 * WIDTH + k]
-                    + h * of[3 * WIDTH + k] + i * of[4 * WIDTH + k] + j * of[5 * WIDTH + k]
+                    e * block[k] + f * block[WIDTH + k] + g * block[2 * WIDTH + k]
+                    + h * block[3 * WIDTH + k] + i * block[4 * WIDTH + k] + j * block[5 * WIDTH + k]
                 )  # fmt: skip
         for s in range(r + 1):
             foot = 6 if s < left else 12

@@ -232,7 +232,7 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
         faces.append(float(np.arctan2(R[1 + leg, 1, 2], R[1 + leg, 0, 2])))
         apart = abs(wrap_angle(faces[-1] - faces[0]))
         if apart > HEADING_LIMIT:
-            other = "body" if inputs.worn == "3I" else "left foot"
+            reference = "body" if inputs.worn == "3I" else "left foot"
             raise EstimationError(
                 "headings_apart",
                 Message(
@@ -241,7 +241,7 @@ def start_l7s_state(inputs: L7sInputs, model: LegModel, params: L7sParams | None
                     "again.",
                     side=side,
                     apart=np.degrees(apart),
-                    other=other,
+                    other=reference,
                 ),
                 sensor=FOOT[side],
             )

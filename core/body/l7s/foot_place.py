@@ -50,32 +50,32 @@ def find_sensor_offsets(inputs: L7sInputs | L7sTake, valid: Bools, model: LegMod
     ----------
     valid : (n, 3) sensor of BODIES available.
     """
-    found = np.zeros((len(LEGS), 3))
+    offsets = np.zeros((len(LEGS), 3))
     for leg in range(len(LEGS)):
         b = 1 + leg
         swings = _swings(inputs.step[:, leg], valid[:, b], rate_hz)
         balls = np.empty((len(swings), 2))
         for part in cut_blocks(len(valid)):
-            here = slice(*np.searchsorted(swings[:, 0], (part.start, part.stop)))
-            if here.start < here.stop:
-                begin = swings[here.start, 0]
-                x = inputs.part(slice(begin, swings[here.stop - 1, 1]))
-                _find_balls(x.R[:, b], x.acc[:, b], swings[here] - begin, 1.0 / rate_hz, balls[here])
-        seen = balls[is_complete(balls)]
-        if len(seen) < LEAST_STRIDES:
+            selected = slice(*np.searchsorted(swings[:, 0], (part.start, part.stop)))
+            if selected.start < selected.stop:
+                begin = swings[selected.start, 0]
+                x = inputs.part(slice(begin, swings[selected.stop - 1, 1]))
+                _find_balls(x.R[:, b], x.acc[:, b], swings[selected] - begin, 1.0 / rate_hz, balls[selected])
+        complete = balls[is_complete(balls)]
+        if len(complete) < LEAST_STRIDES:
             continue
-        forward_down = np.median(seen, axis=0) - [0.0, 0.5 * model.foot]
+        forward_down = np.median(complete, axis=0) - [0.0, 0.5 * model.foot]
         if np.linalg.norm(forward_down) <= ON_FOOT_M:
-            found[leg, ::2] = forward_down
-    return found
+            offsets[leg, ::2] = forward_down
+    return offsets
 
 
 def _swings(step: Bools, valid: Bools, rate_hz: float) -> NDArray[np.int64]:
     """Half-open ranges (s, 2) from the last sample of a rest to the first of the next."""
-    between = [(a[1] - 1, b[0] + 1) for a, b in pairwise(find_runs(step))]
+    ranges = [(a[1] - 1, b[0] + 1) for a, b in pairwise(find_runs(step))]
     swings = [
         (first, last)
-        for first, last in between
+        for first, last in ranges
         if BREAK_S * rate_hz < last - first < STRIDE_S[1] * rate_hz and valid[first:last].all()
     ]
     return np.array(swings, np.int64).reshape(-1, 2)
@@ -108,10 +108,10 @@ def _find_balls(R, acc, swings, dt, balls):  # type: ignore[no-untyped-def]
         xx, xz, zz, xp, zp = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(first + 1, off + 1):
             for c in range(3):
-                before = v[c] - (k - 1 - first) / (last - 1 - first) * drift[c]
+                previous = v[c] - (k - 1 - first) / (last - 1 - first) * drift[c]
                 v[c] += 0.5 * dt * (acc[k - 1, c] + acc[k, c])
                 now = v[c] - (k - first) / (last - 1 - first) * drift[c]
-                way[c] += 0.5 * dt * (before + now)
+                way[c] += 0.5 * dt * (previous + now)
                 x, z = R[first, c, 0] - R[k, c, 0], R[first, c, 2] - R[k, c, 2]
                 xx, xz, zz, xp, zp = xx + x * x, xz + x * z, zz + z * z, xp + x * way[c], zp + z * way[c]
         free = xx * zz - xz * xz
@@ -133,8 +133,8 @@ def _find_push_off(R, first, last):  # type: ignore[no-untyped-def]
     # from its fastest rise on the foot is on its way
     off, most = first, -np.inf
     for k in range(first, highest + 1):
-        before, after = max(first, k - 1), min(last - 1, k + 1)
-        speed = (_find_rise(R, after) - _find_rise(R, before)) / (after - before)
+        lower, upper = max(first, k - 1), min(last - 1, k + 1)
+        speed = (_find_rise(R, upper) - _find_rise(R, lower)) / (upper - lower)
         if speed > most:
             off, most = k, speed
     for k in range(first, off):

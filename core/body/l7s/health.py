@@ -62,12 +62,12 @@ LEVEL: Final[tuple[Protocol, ...]] = ("squat", "activity", "tug")
 def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
     """Judge a run of `l7s_poses` by its own diagnostics."""
     d = cast("dict[str, Any]", poses.diagnostics)
-    found = []
+    findings = []
     for side in d["hinge_m"]:
         foot: Segment = "foot_l" if side == "left" else "foot_r"
         leg = f"leg_{side[0]}"
         moving = longest_run_s(~np.asarray(poses.contact[foot]), poses.rate_hz)
-        found += [
+        findings += [
             HealthFinding("longest_moving_s", foot, moving, *LONGEST_MOVING_S),
             HealthFinding("leg_excess_mm", leg, 1e3 * d["excess_m"][side], *CONSTRAINT_MM),
             HealthFinding("hinge_mm", leg, 1e3 * d["hinge_m"][side], *CONSTRAINT_MM),
@@ -77,18 +77,18 @@ def l7s_health(poses: Poses) -> tuple[HealthFinding, ...]:
         ]
     for segment, lost_s in d["gap_s"].items():
         if lost_s > 0.0:
-            found.append(
+            findings.append(
                 HealthFinding(
                     "gap_s", segment, lost_s, *(PELVIS_GAP_S if segment == "pelvis" else FOOT_GAP_S)
                 )
             )
     for key, name, scale, limits in JUDGED:
         if key in d:
-            found.append(HealthFinding(name, None, scale * d[key], *limits))
-    if not {"toward_foot_mps2", "inner_foot_m"} & {f.name for f in found}:
-        found.append(HealthFinding("inner_foot_m", None, float("nan")))
-    found.append(HealthFinding("min_eigenvalue", None, float(d["min_eigenvalue"])))
-    return tuple(found)
+            findings.append(HealthFinding(name, None, scale * d[key], *limits))
+    if not {"toward_foot_mps2", "inner_foot_m"} & {f.name for f in findings}:
+        findings.append(HealthFinding("inner_foot_m", None, float("nan")))
+    findings.append(HealthFinding("min_eigenvalue", None, float(d["min_eigenvalue"])))
+    return tuple(findings)
 
 
 JUDGED: Final = (

@@ -54,21 +54,21 @@ def _write_sy_frames(q, back, out):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _mark_known(valid, step, lost, known):  # type: ignore[no-untyped-def]
+def _mark_known(valid, step, lost, is_known):  # type: ignore[no-untyped-def]
     """Write which samples (T,) are known; valid (T, n), the feet last; `lost` (2,) is advanced in place."""
     n = valid.shape[1]
     for k in range(valid.shape[0]):
-        known[k] = True
+        is_known[k] = True
         for i in range(n):
             if not valid[k, i]:
-                known[k] = False
+                is_known[k] = False
         for leg in range(2):
             if not valid[k, n - 2 + leg]:
                 lost[leg] = True
             elif step[k, leg]:
                 lost[leg] = False
             if lost[leg]:
-                known[k] = False
+                is_known[k] = False
 
 
 class KnownSamples:
@@ -88,9 +88,9 @@ class KnownSamples:
         valid : (T,) of each instrumented body in the order of `BODIES`. step : (T, 2) left and right foot
             still.
         """
-        known = np.empty(len(step), np.bool_)
-        _mark_known(np.stack(valid, axis=1), np.ascontiguousarray(step, np.bool_), self._lost, known)
-        return known
+        is_known = np.empty(len(step), np.bool_)
+        _mark_known(np.stack(valid, axis=1), np.ascontiguousarray(step, np.bool_), self._lost, is_known)
+        return is_known
 
 
 def remove_gravity(acc: Floats, valid: Bools, q: Floats, mounted: SegmentCalibration) -> Floats:
@@ -157,7 +157,7 @@ def arrange_inputs(
     acceleration: Mapping[Segment, Floats],
     step: Bools,
     model: LegModel,
-    worn: Worn,
+    configuration: Worn,
 ) -> L7sInputs:
     """Convert orientations (T, 4) and accelerations (T, 3) of the instrumented bodies to the filter's order
     and frames.
@@ -169,19 +169,19 @@ def arrange_inputs(
     R, acc = np.empty((len(step), 3, 3, 3)), np.zeros((len(step), 3, 3))
     R[:, 0] = np.eye(3)
     for b, segment in enumerate(BODIES):
-        if segment in bodies_of(worn):
+        if segment in bodies_of(configuration):
             in_frame = np.empty((len(step), 3, 3))
             back = np.ascontiguousarray(model.to_isb(segment).T)
             _write_sy_frames(np.ascontiguousarray(q[segment]), back, in_frame)
             R[:, b], acc[:, b] = in_frame, acceleration[segment]
-    if worn == "2I":
+    if configuration == "2I":
         acc[:, 0] = 0.5 * (acc[:, 1] + acc[:, 2])
-    return L7sInputs(R, acc, step, worn)
+    return L7sInputs(R, acc, step, configuration)
 
 
-def bodies_of(worn: Worn) -> tuple[Segment, ...]:
+def bodies_of(configuration: Worn) -> tuple[Segment, ...]:
     """Bodies of the state that carry a sensor."""
-    return BODIES if worn == "3I" else BODIES[1:]
+    return BODIES if configuration == "3I" else BODIES[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +216,7 @@ def take_of(
     acceleration: Mapping[Segment, SampleSeries],
     steps: Mapping[Side, Bools],
     model: LegModel,
-    worn: Worn,
+    configuration: Worn,
 ) -> L7sTake:
     """The filter inputs of a recording, accessible in parts.
 
@@ -224,7 +224,7 @@ def take_of(
     ------
     EstimationError `sensor_missing` if an instrumented body has no orientation, acceleration or steps.
     """
-    needed = bodies_of(worn)
+    needed = bodies_of(configuration)
     for segment in needed:
         if segment not in orientations.q or segment not in acceleration:
             raise EstimationError(
@@ -232,7 +232,7 @@ def take_of(
                 Message(
                     "L7S-{worn} requires {needed}; there is no data for {segment}. Attach or assign a sensor "
                     "there.",
-                    worn=worn,
+                    worn=configuration,
                     needed=", ".join(needed),
                     segment=segment,
                 ),
@@ -246,4 +246,4 @@ def take_of(
                 sensor=FOOT[side],
             )
     step = np.stack([steps[side] for side in LEGS], axis=1)
-    return L7sTake(orientations.q, acceleration, step, model, worn)
+    return L7sTake(orientations.q, acceleration, step, model, configuration)

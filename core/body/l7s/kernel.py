@@ -108,10 +108,10 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
     group : 0 to 2 orientation of a body, 3 and 4 zero velocity of a foot, 5 mid-pelvis above the feet and its
     height, 6 heights of the feet, 7 the pelvis orientation from the feet. turned : (3, 3) scratch.
     """
-    at, H, left, variance, _ = form
+    offsets, H, left, variance, _ = form
     if group == 5:
         for b in range(3):
-            at[b] = 6 * b
+            offsets[b] = 6 * b
             for axis in range(3):
                 share = 1.0 if b == 0 else -0.5 if axis < 2 else 0.0
                 for i in range(3):
@@ -122,7 +122,11 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
         return 3
     if group == 6:
         for leg in range(2):
-            at[leg], left[leg], variance[leg] = 6 * (1 + leg), heights[1] - p[1 + leg, 2], z_variance[leg]
+            offsets[leg], left[leg], variance[leg] = (
+                6 * (1 + leg),
+                heights[1] - p[1 + leg, 2],
+                z_variance[leg],
+            )
             for i in range(3):
                 H[leg, 3 * leg + i], H[1 - leg, 3 * leg + i], H[2, 3 * leg + i] = R[1 + leg, 2, i], 0.0, 0.0
         return 2
@@ -130,7 +134,7 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
     spread, length = r[0], 0.0
     if group == 7:
         # heading of the feet's summed z axes (eq 22–25)
-        at[0], spread = 3, r[3]
+        offsets[0], spread = 3, r[3]
         tx, ty = R[1, 0, 2] + R[2, 0, 2], R[1, 1, 2] + R[2, 1, 2]
         theta, length = np.arctan2(ty, tx), tx * tx + ty * ty
         c, s = np.cos(theta), np.sin(theta)
@@ -139,10 +143,10 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
             turned[i, 1] = R[0, 1, i] * c - R[0, 0, i] * s
             turned[i, 2] = R[0, 2, i]
     elif group < 3:
-        at[0] = 6 * group + 3
+        offsets[0] = 6 * group + 3
         _relative(R[group], measured[group], turned)
     if 3 <= group <= 4:
-        at[0], spread = VELOCITY + 3 * (group - 2), r[4]
+        offsets[0], spread = VELOCITY + 3 * (group - 2), r[4]
         for i in range(3):
             left[i] = -v[group - 2, i]
     else:
@@ -154,7 +158,7 @@ def _write_rows(group, R, p, v, measured, z_variance, heights, r, form, turned):
     if group < 7:
         return 1
     for f in range(1, 3):
-        at[f] = 6 * f + 3
+        offsets[f] = 6 * f + 3
         for i in range(3):
             # rows x and y of −R_f [ẑ]×: ∂θ/∂φ of a foot
             up = -R[0, 2, i] / length

@@ -79,7 +79,7 @@ def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped
         tz = x[k, 2] + side * R[k, 0, 2, 1] - x[k, f + 2] + lengths[1] * R[k, 1 + leg, 2, 2]
         reach = sqrt(tx * tx + ty * ty + tz * tz)
         yx, yy, yz = R[k, 1 + leg, 0, 1], R[k, 1 + leg, 1, 1], R[k, 1 + leg, 2, 1]
-        across, along, pull = spread[0] * (yx * tx + yy * ty + yz * tz), 0.0, 0.0
+        weight, along, pull = spread[0] * (yx * tx + yy * ty + yz * tz), 0.0, 0.0
         if still[k, leg] and not still[k, 1 - leg]:
             along += spread[1]
             pull += spread[1] * (reach - lengths[3])
@@ -89,7 +89,7 @@ def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped
         along, pull = along / (reach * reach), pull / reach
         u, y = (tx, ty, tz), (yx, yy, yz)
         for i in range(3):
-            slope = across * y[i] + pull * u[i]
+            slope = weight * y[i] + pull * u[i]
             B[_WIDTH * i + SIZE] += slope
             B[_WIDTH * (f + i) + SIZE] -= slope
             for j in range(3):
@@ -102,7 +102,7 @@ def _add_legs(x, R, k, still, spread, lengths, A, B):  # type: ignore[no-untyped
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")  # type: ignore[misc, unused-ignore]
 def move_nodes(  # type: ignore[no-untyped-def]
-    x, start, R, bent, stiff, still, hold, spread, lengths, heights, kept
+    x, start, R, bent, stiff, still, hold, spread, lengths, heights, work
 ):
     """Update the positions x (T, 9) by one pass; return the largest change of a position, NaN without a
     solution.
@@ -111,27 +111,27 @@ def move_nodes(  # type: ignore[no-untyped-def]
     ----------
     start : the filter's. R : (T, 3, 3, 3). bent : second differences of the integrated accelerations. still :
     (T, 2) from each node to the next. lengths : half hip width, half foot, leg, supporting leg. heights :
-    pelvis, foot. kept : (T, KEPT) scratch. Weights: stiff (T + 1, 3) of the second differences, 0 at both
+    pelvis, foot. work : (T, KEPT) scratch. Weights: stiff (T + 1, 3) of the second differences, 0 at both
     ends; hold (6,) of the filter's positions, displacement of a resting foot, the mid-pelvis, the heights of
     pelvis, moving foot and resting foot; spread (3,) of hinge, supporting leg, leg too long.
     """
     T, n = len(x), SIZE
     A, column = np.zeros(n * n), np.zeros(n)
-    B, after = np.zeros(n * _WIDTH), np.zeros(n * _WIDTH)
-    now, then, tie = np.zeros(n), np.zeros(n), np.zeros(n)
-    before, rested = np.zeros(n), np.zeros(2)
+    B, following = np.zeros(n * _WIDTH), np.zeros(n * _WIDTH)
+    now, second_next, tie = np.zeros(n), np.zeros(n), np.zeros(n)
+    previous, rested = np.zeros(n), np.zeros(2)
     V, W, nothing = np.empty(n * n), np.empty(n * (n + 1)), np.zeros(n)
     for k in range(T):
         # accelerations, resting feet, the filter's places
         for j in range(n):
             b = j // 3
             last = stiff[k - 1, b] if k > 0 else 0.0
-            here, next_ = stiff[k, b], stiff[k + 1, b]
-            then[j] = 0.0
+            stiffness, next_ = stiff[k, b], stiff[k + 1, b]
+            second_next[j] = 0.0
             if next_ > 0.0:
-                then[j] = next_ * (x[k, j] - 2.0 * x[k + 1, j] + x[k + 2, j] - bent[k + 1, j])
-            slope = before[j] - 2.0 * now[j] + then[j] + hold[0] * (x[k, j] - start[k, j])
-            square, beside = last + 4.0 * here + next_ + hold[0], -2.0 * (here + next_)
+                second_next[j] = next_ * (x[k, j] - 2.0 * x[k + 1, j] + x[k + 2, j] - bent[k + 1, j])
+            slope = previous[j] - 2.0 * now[j] + second_next[j] + hold[0] * (x[k, j] - start[k, j])
+            square, coupling = last + 4.0 * stiffness + next_ + hold[0], -2.0 * (stiffness + next_)
             if b > 0:
                 if rested[b - 1] > 0.0:
                     slope += hold[1] * (x[k, j] - x[k - 1, j])
@@ -139,9 +139,9 @@ def move_nodes(  # type: ignore[no-untyped-def]
                 if still[k, b - 1] and k < T - 1:
                     slope -= hold[1] * (x[k + 1, j] - x[k, j])
                     square += hold[1]
-                    beside -= hold[1]
+                    coupling -= hold[1]
             A[(n + 1) * j] += square
-            B[(_WIDTH + 1) * j] += beside
+            B[(_WIDTH + 1) * j] += coupling
             B[_WIDTH * j + n] += slope
             tie[j] = next_
         # mid-pelvis over the feet, heights
@@ -175,34 +175,34 @@ def move_nodes(  # type: ignore[no-untyped-def]
             _combine(B[i:], _WIDTH, V, n, nothing, W[n * i :], n)
         # what that leaves of the next two
         for i in range(n):
-            _combine(W[n * i :], 1, B, _WIDTH, after[_WIDTH * i :], after[_WIDTH * i :], n + 1)
+            _combine(W[n * i :], 1, B, _WIDTH, following[_WIDTH * i :], following[_WIDTH * i :], n + 1)
         for i in range(n):
             for j in range(n):
-                A[n * i + j] = after[_WIDTH * i + j]
-                after[_WIDTH * i + j] = tie[i] * V[n * i + j] * tie[j]
+                A[n * i + j] = following[_WIDTH * i + j]
+                following[_WIDTH * i + j] = tie[i] * V[n * i + j] * tie[j]
         for i in range(n):
             for j in range(n):
                 B[_WIDTH * i + j] = W[n * i + j] * tie[j]
-            B[_WIDTH * i + n] = after[_WIDTH * i + n]
-            after[_WIDTH * i + n] = tie[i] * W[n * n + i]
+            B[_WIDTH * i + n] = following[_WIDTH * i + n]
+            following[_WIDTH * i + n] = tie[i] * W[n * n + i]
         for j in range(len(V)):
-            kept[k, j] = V[j]
+            work[k, j] = V[j]
         for j in range(len(W)):
-            kept[k, n * n + j] = W[j]
+            work[k, n * n + j] = W[j]
         for j in range(n):
-            before[j], now[j] = now[j], then[j]
+            previous[j], now[j] = now[j], second_next[j]
     most = 0.0
     for j in range(n):
-        now[j], then[j] = 0.0, 0.0
+        now[j], second_next[j] = 0.0, 0.0
     for k in range(T - 1, -1, -1):
         # now : move of the next node. then : of the next but one
         for j in range(n):
-            column[j] = kept[k, n * n + n * n + j]
-            tie[j] = stiff[k + 1, j // 3] * then[j]
-        _combine(now, 1, kept[k, n * n :], n, column, column, n)
-        _combine(tie, 1, kept[k], n, column, column, n)
+            column[j] = work[k, n * n + n * n + j]
+            tie[j] = stiff[k + 1, j // 3] * second_next[j]
+        _combine(now, 1, work[k, n * n :], n, column, column, n)
+        _combine(tie, 1, work[k], n, column, column, n)
         for j in range(n):
             x[k, j] += column[j]
             most = max(most, abs(column[j]))
-            then[j], now[j] = now[j], column[j]
+            second_next[j], now[j] = now[j], column[j]
     return most

@@ -41,7 +41,7 @@ def l7s_poses(
     steps: Mapping[Side, Bools],
     body: BodyModel,
     params: L7sParams | None = None,
-    worn: Worn | None = None,
+    configuration: Worn | None = None,
     *,
     both_ways: bool = True,
 ) -> Poses:
@@ -53,8 +53,8 @@ def l7s_poses(
     acceleration : segment → (n, 3) in W without gravity, m/s²
         (`sagittal.core.body.l7s.inputs.free_acceleration`).
     steps : side → (n,) foot still on the floor: zero velocity, not contact.
-    worn : None = 3I with a pelvis, else 2I. both_ways : smoothed positions (core/body/l7s/smoother.py); False
-        returns those of the filter, as in live use.
+    configuration : None = 3I with a pelvis, else 2I. both_ways : smoothed positions
+        (core/body/l7s/smoother.py); False returns those of the filter, as in live use.
 
     Returns
     -------
@@ -75,18 +75,18 @@ def l7s_poses(
     EstimationError `sensor_missing`, `segment_length`, `headings_apart`, `bad_signal`, `l7s_diverged`.
     """
     params = params or L7sParams()
-    worn = worn or ("3I" if "pelvis" in orientations.q else "2I")
+    configuration = configuration or ("3I" if "pelvis" in orientations.q else "2I")
     model = LegModel.of(body)
-    take = take_of(orientations, acceleration, steps, model, worn)
-    measured, rate = bodies_of(worn), orientations.rate_hz
+    take = take_of(orientations, acceleration, steps, model, configuration)
+    measured, rate = bodies_of(configuration), orientations.rate_hz
     valid = None
     if both_ways:
         valid = np.stack([orientations.valid[s] if s in measured else steps["left"] for s in BODIES], axis=1)
     offsets, windows = place_windows(take, valid, rate, params)
     figure = _Figure(take)
     P = figure.add_all(windows)
-    known = KnownSamples().push([orientations.valid[s] for s in measured], take.step)
-    shown = figure.measure()
+    is_known = KnownSamples().push([orientations.valid[s] for s in measured], take.step)
+    measured_diagnostics = figure.measure()
     del take, windows
     checks = walking_checks(figure.seen, model, rate)
     poses = Poses(
@@ -94,14 +94,14 @@ def l7s_poses(
         rate_hz=orientations.rate_hz,
         q=figure.q,
         p=figure.p,
-        valid=known,
+        valid=is_known,
         contact={FOOT[s]: np.asarray(steps[s], bool) for s in LEGS},
         body=body,
-        method=(L7S_3I if worn == "3I" else L7S_2I).method,
+        method=(L7S_3I if configuration == "3I" else L7S_2I).method,
         notices=_never_still(steps),
         diagnostics={
             "adjoint": params.adjoint,
-            **shown,
+            **measured_diagnostics,
             **_describe_filter(steps, offsets, P),
             "gap_s": longest_gaps({s: orientations.valid[s] for s in measured}, rate),
             **checks,
@@ -124,8 +124,8 @@ class _Figure:
         self.p: dict[Segment, Floats] = {s: make_room(n, 3, kind=kind) for s in FIGURE}
         self.seen = SeenWalk.make_room(n, pelvis=take.worn == "3I")
         self._model = take.model
-        both = take.step.all(axis=1)
-        self._moving: Bools = np.asarray(~both | both.all())
+        both_still = take.step.all(axis=1)
+        self._moving: Bools = np.asarray(~both_still | both_still.all())
         self._passes, self._moved = 0, 0.0
         self._straight, self._hinge, self._excess = np.zeros(2, np.int64), np.zeros(2), np.zeros(2)
         self._turned: list[Floats] = []
@@ -137,11 +137,13 @@ class _Figure:
         for part in cut_blocks(len(window.R)):
             R, inputs, track = window.R[part], window.inputs.part(part), window.track.part(part)
             legs = solve_legs(R, window.p[part], self._model)
-            at = slice(window.first + part.start, window.first + part.stop)
+            samples = slice(window.first + part.start, window.first + part.stop)
             for i, s in enumerate(FIGURE):
-                self.q[s][at], self.p[s][at] = legs.q[:, i], legs.p[:, i]
-            self.seen.put(at, SeenWalk.of(inputs, track))
-            self._straight += np.count_nonzero(legs.reach[self._moving[at]] > length - STRETCHED_M, axis=0)
+                self.q[s][samples], self.p[s][samples] = legs.q[:, i], legs.p[:, i]
+            self.seen.put(samples, SeenWalk.of(inputs, track))
+            self._straight += np.count_nonzero(
+                legs.reach[self._moving[samples]] > length - STRETCHED_M, axis=0
+            )
             self._hinge = np.maximum(self._hinge, np.abs(legs.hinge).max(axis=0))
             self._excess = np.maximum(self._excess, (legs.reach - length).max(axis=0))
             turned, measured = (from_matrix(x[:, 1:].reshape(-1, 3, 3)) for x in (R, inputs.R))
@@ -208,8 +210,8 @@ def compile_l7s_kernel() -> None:
     R = np.tile(np.stack((np.eye(3), R_NEUTRAL @ foot, R_NEUTRAL @ foot)), (n, 1, 1, 1))
     step = np.ones((n, 2), bool)
     step[10:-10] = False  # a swing, whose ball is looked for
-    for worn in get_args(Worn):
-        inputs = L7sInputs(R, np.zeros((n, 3, 3)), step, worn)
+    for configuration in get_args(Worn):
+        inputs = L7sInputs(R, np.zeros((n, 3, 3)), step, configuration)
         track, _ = filter_block(start_l7s_state(inputs, model), inputs, model, 100.0)
         smooth_track(track, inputs, np.ones((n, 3), bool), model, 100.0)
         solve_legs(track.R, track.p, model)

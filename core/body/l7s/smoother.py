@@ -121,22 +121,23 @@ def smooth_track(
         R[:, 0], acc[:, 0], density[:, 0] = _level_pelvis(R), 0.0, DENSITY_UNWORN
     n, dt = len(acc), 1.0 / rate_hz
     hop = find_hop(rate_hz)
-    at = np.arange(0, n, hop)
+    nodes = np.arange(0, n, hop)
     leg = model.thigh + model.shank
     lengths = np.array([0.5 * model.hip_width, 0.5 * model.foot, leg, CARRIED * leg])
     if offsets is None:
         offsets = find_sensor_offsets(inputs, valid, model, rate_hz)
     p, passes, moved = track.p.copy(), 0, 0.0
-    if len(at) > 2:
+    if len(nodes) > 2:
         free = _integrate_twice(acc, dt)
         free[:, 1:] += np.einsum("nbij,bj->nbi", R[:, 1:], offsets)
-        filtered = p[at].reshape(-1, 9)
+        filtered = p[nodes].reshape(-1, 9)
         x, passes, moved = solve_nodes(
-            filtered, filtered, free[at].reshape(-1, 9), np.ascontiguousarray(R[at]),
-            np.maximum.reduceat(density, at, axis=0), np.minimum.reduceat(inputs.step, at, axis=0), hop * dt,
+            filtered, filtered, free[nodes].reshape(-1, 9), np.ascontiguousarray(R[nodes]),
+            np.maximum.reduceat(density, nodes, axis=0), np.minimum.reduceat(inputs.step, nodes, axis=0),
+            hop * dt,
             lengths, np.array([model.hip_height, model.foot_height]),
         )  # fmt: skip
-        p = free + _interpolate(x.reshape(-1, 3, 3) - free[at], at, n)
+        p = free + _interpolate(x.reshape(-1, 3, 3) - free[nodes], nodes, n)
     if not np.isfinite(p).all():
         raise EstimationError("l7s_diverged", NOT_FOUND)
     failed = _project_all(R, p, lengths)
@@ -192,11 +193,11 @@ def solve_nodes(
         hop_s / FOOT_HEIGHT[1], hop_s / FOOT_HEIGHT[0],
     ])  # fmt: skip
     spread = hop_s / np.array([HINGE, CARRIES, LONGER])
-    kept = np.empty((len(x), KEPT))
+    work = np.empty((len(x), KEPT))
     passes, most = 0, 0.0
     while passes < PASSES:
         passes += 1
-        most = move_nodes(x, pull, R, bent, stiff, still, hold, spread, lengths, heights, kept)
+        most = move_nodes(x, pull, R, bent, stiff, still, hold, spread, lengths, heights, work)
         if np.isnan(most):
             raise EstimationError("l7s_diverged", NOT_FOUND)
         if most < SETTLED_M:
@@ -221,11 +222,11 @@ def _integrate_twice(acc: Floats, dt: float) -> Floats:
     return np.asarray(np.cumsum(dt * v - 0.5 * dt * dt * acc, axis=0))
 
 
-def _interpolate(slow: Floats, at: np.ndarray, n: int) -> Floats:
+def _interpolate(slow: Floats, nodes: np.ndarray, n: int) -> Floats:
     """Corrections (n, 3, 3) linearly interpolated between the nodes, extrapolated after the last one."""
-    hop = int(at[1])
-    k = np.minimum(np.arange(n) // hop, len(at) - 2)
-    share = ((np.arange(n) - at[k]) / hop)[:, None, None]
+    hop = int(nodes[1])
+    k = np.minimum(np.arange(n) // hop, len(nodes) - 2)
+    share = ((np.arange(n) - nodes[k]) / hop)[:, None, None]
     return np.asarray(slow[k] + share * (slow[k + 1] - slow[k]))
 
 

@@ -45,12 +45,12 @@ def apply_rows(P, dx, triples, form):  # type: ignore[no-untyped-def]
         of `make_form`; their offsets in ε, H of the rows at those, residuals, variances, and space for gains.
         A row of zeros has no effect.
     """
-    at, H, residual, variance, gain = form
+    offsets, H, residual, variance, gain = form
     n = len(dx)
     for j in range(3 * n):
         gain[j] = 0.0
     for t in range(triples):
-        rows, k = P[WIDTH * at[t] :], 3 * t
+        rows, k = P[WIDTH * offsets[t] :], 3 * t
         a, b, c, d, e, f = H[0, k], H[0, k + 1], H[0, k + 2], H[1, k], H[1, k + 1], H[1, k + 2]
         g, h, i = H[2, k], H[2, k + 1], H[2, k + 2]
         for j in range(n):
@@ -60,17 +60,17 @@ def apply_rows(P, dx, triples, form):  # type: ignore[no-untyped-def]
             gain[2 * WIDTH + j] += g * x + h * y + i * z
     for m in range(3):
         own, total, left = WIDTH * m, variance[m], residual[m]
-        for before in range(0, own, WIDTH):
+        for row_start in range(0, own, WIDTH):
             share = 0.0
             for t in range(triples):
                 for i in range(3):
-                    share += H[m, 3 * t + i] * gain[before + at[t] + i]
+                    share += H[m, 3 * t + i] * gain[row_start + offsets[t] + i]
             for j in range(n):
-                gain[own + j] -= share * gain[before + j]
+                gain[own + j] -= share * gain[row_start + j]
         for t in range(triples):
             for i in range(3):
-                total += H[m, 3 * t + i] * gain[own + at[t] + i]
-                left -= H[m, 3 * t + i] * dx[at[t] + i]
+                total += H[m, 3 * t + i] * gain[own + offsets[t] + i]
+                left -= H[m, 3 * t + i] * dx[offsets[t] + i]
         # P − g gᵀ with g over the root: as symmetric as P was
         scale = 1.0 / sqrt(total)
         left *= scale

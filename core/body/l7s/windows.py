@@ -62,11 +62,11 @@ def cut_windows(samples: int, rate_hz: float) -> list[tuple[slice, slice]]:
     count = 1 if samples <= WHOLE else -(-samples // LONG)
     hop, around = find_hop(rate_hz), round(AROUND_S / NODE_S) * find_hop(rate_hz)
     edges = [*(samples * i // count // hop * hop for i in range(count)), samples]
-    found = []
+    windows = []
     for first, past in pairwise(edges):
         start, stop = max(0, first - around), min(samples, past + around)
-        found.append((slice(start, stop), slice(first - start, past - start)))
-    return found
+        windows.append((slice(start, stop), slice(first - start, past - start)))
+    return windows
 
 
 def place_windows(
@@ -101,13 +101,13 @@ def _windows(
     first = 0
     for solved, own in cut_windows(len(take.step), rate_hz):
         fresh = take.part(slice(first + len(inputs.step), solved.stop))
-        found, state = filter_block(state, fresh, model, rate_hz, params)
+        filtered, state = filter_block(state, fresh, model, rate_hz, params)
         if track is None:
-            inputs, track = fresh, found
+            inputs, track = fresh, filtered
         else:
             left = slice(solved.start - first, None)
-            inputs, track = join_inputs(inputs.part(left), fresh), join_tracks(track.part(left), found)
-        del fresh, found
+            inputs, track = join_inputs(inputs.part(left), fresh), join_tracks(track.part(left), filtered)
+        del fresh, filtered
         first = solved.start
         R, p, passes, moved = track.R[own], track.p[own], 0, 0.0
         if valid is not None:
@@ -116,17 +116,17 @@ def _windows(
         yield PlacedWindow(first + own.start, inputs.part(own), track.part(own), R, p, passes, moved, state.P)
 
 
-def join_inputs(before: L7sInputs, after: L7sInputs) -> L7sInputs:
+def join_inputs(earlier: L7sInputs, later: L7sInputs) -> L7sInputs:
     """Concatenate two consecutive blocks."""
     return L7sInputs(
-        np.concatenate((before.R, after.R)),
-        np.concatenate((before.acc, after.acc)),
-        np.concatenate((before.step, after.step)),
-        before.worn,
+        np.concatenate((earlier.R, later.R)),
+        np.concatenate((earlier.acc, later.acc)),
+        np.concatenate((earlier.step, later.step)),
+        earlier.worn,
     )
 
 
-def join_tracks(before: L7sTrack, after: L7sTrack) -> L7sTrack:
+def join_tracks(earlier: L7sTrack, later: L7sTrack) -> L7sTrack:
     """Concatenate two consecutive tracks."""
-    pairs = zip(vars(before).values(), vars(after).values(), strict=True)
+    pairs = zip(vars(earlier).values(), vars(later).values(), strict=True)
     return L7sTrack(*(np.concatenate(pair) for pair in pairs))

@@ -70,10 +70,10 @@ class ReferenceTrial:
     @property
     def sha256(self) -> str:
         """Digest of the rate and all samples, independent of the file."""
-        found = hashlib.sha256(repr(self.rate_hz).encode())
+        digest = hashlib.sha256(repr(self.rate_hz).encode())
         for array in (self.gyr, self.acc, self.mag, self.reference, self.moving):
-            found.update(array.tobytes())
-        return found.hexdigest()
+            digest.update(array.tobytes())
+        return digest.hexdigest()
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
     """
     try:
         with np.load(BytesIO(content), allow_pickle=False) as file:
-            found = {key: np.asarray(file[key]) for key in (*_SHAPES, "movement", "sampling_rate")}
+            arrays = {key: np.asarray(file[key]) for key in (*_SHAPES, "movement", "sampling_rate")}
     except _UNREADABLE as error:
         raise FormatError(
             "not_a_trial",
@@ -103,16 +103,20 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
                 name=name,
             ),
         ) from error
-    if wrong := [key for key, array in found.items() if array.dtype.kind not in "fiub"]:
+    if wrong := [key for key, array in arrays.items() if array.dtype.kind not in "fiub"]:
         raise FormatError(
             "not_a_trial", Message("{name}: {wrong} are no numbers.", name=name, wrong=", ".join(wrong))
         )
-    n = found["movement"].size
-    if not n or found["movement"].shape != (n,) or any(found[k].shape != (n, d) for k, d in _SHAPES.items()):
+    n = arrays["movement"].size
+    if (
+        not n
+        or arrays["movement"].shape != (n,)
+        or any(arrays[k].shape != (n, d) for k, d in _SHAPES.items())
+    ):
         raise FormatError(
             "not_a_trial", Message("{name}: arrays of different lengths, or without samples.", name=name)
         )
-    rate = found["sampling_rate"]
+    rate = arrays["sampling_rate"]
     if rate.size != 1 or not _RATES[0] <= rate.item() <= _RATES[1]:
         raise FormatError(
             "not_a_trial",
@@ -123,10 +127,10 @@ def read_trial(name: str, content: bytes) -> ReferenceTrial:
                 RATES2=_RATES[1],
             ),
         )
-    gyr, acc, mag, reference = (np.array(found[key], np.float64, order="C") for key in _SHAPES)
+    gyr, acc, mag, reference = (np.array(arrays[key], np.float64, order="C") for key in _SHAPES)
     norm = np.linalg.norm(reference, axis=1)
     reference[(norm < _NORM[0]) | (norm > _NORM[1])] = np.nan
-    return ReferenceTrial(name, float(rate.item()), gyr, acc, mag, reference, found["movement"].astype(bool))
+    return ReferenceTrial(name, float(rate.item()), gyr, acc, mag, reference, arrays["movement"].astype(bool))
 
 
 def find_rest(trial: ReferenceTrial, *, with_bias: bool = False) -> RestMeans:
@@ -147,8 +151,8 @@ def find_rest(trial: ReferenceTrial, *, with_bias: bool = False) -> RestMeans:
             ),
         )
     acc, gyr, mag = (x[:first, None] for x in (trial.acc, trial.gyr, trial.mag))
-    rest = RestMeans.over(acc, gyr, mag if trial.has_magnetometer else None)
-    return RestMeans(rest.acc, np.zeros((1, 3)), rest.mag) if with_bias else rest
+    means = RestMeans.over(acc, gyr, mag if trial.has_magnetometer else None)
+    return RestMeans(means.acc, np.zeros((1, 3)), means.mag) if with_bias else means
 
 
 def run_trial(
@@ -165,8 +169,8 @@ def run_trial(
     ----------
     with_bias, magnetometer : as in `find_rest` and `FusionFilter`.
     """
-    rest = find_rest(trial, with_bias=with_bias)
-    run = FusionFilter(name, trial.rate_hz, rest, params, magnetometer=magnetometer)
+    means = find_rest(trial, with_bias=with_bias)
+    run = FusionFilter(name, trial.rate_hz, means, params, magnetometer=magnetometer)
     return run.advance(trial.gyr[:, None], trial.acc[:, None], trial.mag[:, None])[:, 0]
 
 

@@ -269,11 +269,11 @@ def _turn_world(q, w, x, y, z):  # type: ignore[no-untyped-def]
 def _halve_heading(q, m):  # type: ignore[no-untyped-def]
     """Cosine and sine of half the rotation about the vertical that makes m (3,) point north (+y)."""
     x, y, _ = turn_to_world(q, m[0], m[1], m[2])
-    across = sqrt(x * x + y * y)
-    if across == 0.0:
+    horizontal = sqrt(x * x + y * y)
+    if horizontal == 0.0:
         return 1.0, 0.0
-    c = sqrt(0.5 + 0.5 * abs(y) / across)
-    s = 0.5 * x / (across * c)
+    c = sqrt(0.5 + 0.5 * abs(y) / horizontal)
+    s = 0.5 * x / (horizontal * c)
     if y >= 0.0:
         return c, s
     return abs(s), c if x >= 0.0 else -c
@@ -312,9 +312,9 @@ def _tilt_then_heading(q, a, m, has_a, has_m, share_a, share_m):  # type: ignore
     """
     if has_a:
         x, y, z = turn_to_world(q, a[0], a[1], a[2])
-        across = sqrt(x * x + y * y)
-        if across > 0.0:
-            angle = share_a * atan2(across, z) / across
+        horizontal = sqrt(x * x + y * y)
+        if horizontal > 0.0:
+            angle = share_a * atan2(horizontal, z) / horizontal
             h0, h1, h2, h3 = half_turn(angle * y, -angle * x, 0.0)
             _turn_world(q, h0, h1, h2, h3)
     if has_m:

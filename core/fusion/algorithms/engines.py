@@ -56,14 +56,14 @@ class Setting:
 
     def rows(self, names: Sequence[str], convert: Callable[[str, Floats], Floats]) -> Floats:
         """Gains (g, 42) in the order of names; zero for those the algorithm does not have."""
-        found = []
+        gain_rows = []
         for name in names:
             gain: Gain = getattr(self.params, name, FixedGain(0.0))
             row = gain.row()
             for part in (LEVELS, OUTPUT):
                 row[part] = convert(name, row[part])
-            found.append(row)
-        return np.array(found).reshape(-1, WIDTH)
+            gain_rows.append(row)
+        return np.array(gain_rows).reshape(-1, WIDTH)
 
     def constants(self, names: Sequence[str]) -> dict[str, float]:
         """Numbers by name; zero for those the algorithm does not have."""
@@ -93,10 +93,10 @@ class Prepared:
     bias: int | None
 
 
-def prepare_complementary(kind: str, given: Setting) -> Prepared:
+def prepare_complementary(kind: str, setting: Setting) -> Prepared:
     """E1."""
     shares = complementary.FRACTIONS.get(kind, ())
-    ratio = GAINS_RATE_HZ / given.rate_hz
+    ratio = GAINS_RATE_HZ / setting.rate_hz
 
     def convert(name: str, values: Floats) -> Floats:
         if name not in shares:
@@ -107,106 +107,106 @@ def prepare_complementary(kind: str, given: Setting) -> Prepared:
             )
         return np.asarray(1.0 - (1.0 - values) ** ratio)
 
-    rows = given.rows(complementary.GAINS[kind], convert)
-    values = given.constants(complementary.CONSTANTS[kind])
+    rows = setting.rows(complementary.GAINS[kind], convert)
+    values = setting.constants(complementary.CONSTANTS[kind])
     for name in values:
         values[name] = float(convert(name, np.array([values[name]]))[0])
-    if not given.has_mag:
+    if not setting.has_mag:
         values |= dict.fromkeys(complementary.LEARNS_BIAS.get(kind, ()), 0.0)
     constants = np.array([*values.values(), 0.0])
-    state = np.zeros((len(given.q), complementary.SIZE))
-    state[:, :4] = given.q
-    number, dt = complementary.KINDS.index(kind), 1.0 / given.rate_hz
+    state = np.zeros((len(setting.q), complementary.SIZE))
+    state[:, :4] = setting.q
+    number, dt = complementary.KINDS.index(kind), 1.0 / setting.rate_hz
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
-        complementary.run_complementary(number, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out)
+        complementary.run_complementary(number, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out)
 
     return Prepared(state, run, complementary.BIAS)
 
 
-def prepare_quaternion_kalman(kind: str, given: Setting) -> Prepared:
+def prepare_quaternion_kalman(kind: str, setting: Setting) -> Prepared:
     """E2."""
-    rows = given.noise_rows(quaternion_kalman.GAINS)
-    values = given.constants(quaternion_kalman.CONSTANTS)
-    values |= {name: given.decay(values[name]) for name in ("c_a", "c_d")}
+    rows = setting.noise_rows(quaternion_kalman.GAINS)
+    values = setting.constants(quaternion_kalman.CONSTANTS)
+    values |= {name: setting.decay(values[name]) for name in ("c_a", "c_d")}
     constants = np.array([*values.values()])
-    adaptation: InnovationRules | None = getattr(given.params, "adaptation", None)
+    adaptation: InnovationRules | None = getattr(setting.params, "adaptation", None)
     window, rules = 0, np.zeros(WIDTH)
     if adaptation is not None:
-        ratio = given.rate_hz / GAINS_RATE_HZ
+        ratio = setting.rate_hz / GAINS_RATE_HZ
         window, rules = min(max(round(adaptation.window * ratio), 1), LONGEST_WINDOW), adaptation.row()
         rules[OUTPUT] *= ratio
     start = values["p0"], rows[0, 0] ** 2
-    state = np.array([quaternion_kalman.start_state(kind, q, *start) for q in given.q])
-    number, dt = quaternion_kalman.KINDS.index(kind), 1.0 / given.rate_hz
+    state = np.array([quaternion_kalman.start_state(kind, q, *start) for q in setting.q])
+    number, dt = quaternion_kalman.KINDS.index(kind), 1.0 / setting.rate_hz
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
         quaternion_kalman.run_quaternion_kalman(
-            number, window, rules, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+            number, window, rules, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out
         )
 
     return Prepared(state, run, None)
 
 
-def prepare_extended_kalman(kind: str, given: Setting) -> Prepared:
+def prepare_extended_kalman(kind: str, setting: Setting) -> Prepared:
     """E3."""
-    blocks = extended_kalman.find_blocks(kind, given.has_mag)
-    rows = given.noise_rows(extended_kalman.GAINS)
-    values = given.constants(extended_kalman.CONSTANTS)
-    values |= {name: given.decay(values[name]) for name in ("c_a", "c_d")}
+    blocks = extended_kalman.find_blocks(kind, setting.has_mag)
+    rows = setting.noise_rows(extended_kalman.GAINS)
+    values = setting.constants(extended_kalman.CONSTANTS)
+    values |= {name: setting.decay(values[name]) for name in ("c_a", "c_d")}
     if values["gamma"] == 0.0:
         values["gamma"] = np.inf
     constants = np.array([*values.values()])
-    state = np.array([extended_kalman.start_state(blocks, q, values["p0"]) for q in given.q])
+    state = np.array([extended_kalman.start_state(blocks, q, values["p0"]) for q in setting.q])
     places, dt, quasi_static = (
         extended_kalman.place_blocks(blocks),
-        1.0 / given.rate_hz,
+        1.0 / setting.rate_hz,
         kind == "quasi_static",
     )
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
         extended_kalman.run_extended_kalman(
-            quasi_static, places, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+            quasi_static, places, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out
         )
 
     return Prepared(state, run, int(places[1]) if "b" in blocks else None)
 
 
-def prepare_sigma_point(kind: str, given: Setting) -> Prepared:
+def prepare_sigma_point(kind: str, setting: Setting) -> Prepared:
     """E4."""
-    n = sigma_point.count_states(given.has_mag)
+    n = sigma_point.count_states(setting.has_mag)
     options = {
-        name: getattr(given.params, name)
+        name: getattr(setting.params, name)
         for name in ("alpha", "beta", "kappa", "weight")
-        if hasattr(given.params, name)
+        if hasattr(setting.params, name)
     }
     points, mean, spread = sigma_point.make_points(kind, n, **options)
-    rows = given.noise_rows(sigma_point.GAINS)
-    values = given.constants(sigma_point.CONSTANTS)
-    values["c_a"] = given.decay(values["c_a"])
+    rows = setting.noise_rows(sigma_point.GAINS)
+    values = setting.constants(sigma_point.CONSTANTS)
+    values["c_a"] = setting.decay(values["c_a"])
     constants = np.array([*values.values()])
-    state = np.array([sigma_point.start_state(n, q, values["p0"]) for q in given.q])
-    dt = 1.0 / given.rate_hz
+    state = np.array([sigma_point.start_state(n, q, values["p0"]) for q in setting.q])
+    dt = 1.0 / setting.rate_hz
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
         sigma_point.run_sigma_point(
-            points, mean, spread, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+            points, mean, spread, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out
         )
 
-    return Prepared(state, run, 7 if given.has_mag else None)
+    return Prepared(state, run, 7 if setting.has_mag else None)
 
 
-def prepare_error_state(kind: str, given: Setting) -> Prepared:
+def prepare_error_state(kind: str, setting: Setting) -> Prepared:
     """E5."""
-    rows = given.noise_rows(error_state.GAINS)
-    values = given.constants(error_state.CONSTANTS)
-    ratio = given.rate_hz / GAINS_RATE_HZ
+    rows = setting.noise_rows(error_state.GAINS)
+    values = setting.constants(error_state.CONSTANTS)
+    ratio = setting.rate_hz / GAINS_RATE_HZ
     if kind == "disturbed":
-        decay = float(getattr(given.params, "sigma", 0.0))
-        values["s_b"] = float(getattr(given.params, "zeta", 0.0))
-        values["xi"] = given.drive(values["xi"], error_state.ACCELERATION_DECAY)
-        values["gamma_d"] = given.drive(values["gamma"], decay)
-        values["sigma_d"] = given.decay(decay)
+        decay = float(getattr(setting.params, "sigma", 0.0))
+        values["s_b"] = float(getattr(setting.params, "zeta", 0.0))
+        values["xi"] = setting.drive(values["xi"], error_state.ACCELERATION_DECAY)
+        values["gamma_d"] = setting.drive(values["gamma"], decay)
+        values["sigma_d"] = setting.decay(decay)
     if kind == "external":
         values["m1"] = min(max(round(values["m1"] * ratio), 1), error_state.LONGEST)
         values["m2"] = round(values["m2"] * ratio)
@@ -216,43 +216,43 @@ def prepare_error_state(kind: str, given: Setting) -> Prepared:
         values |= {name: values[name] * ratio for name in ("c_a", "c_m")}
     # only Suh 2010 has variances of its own for the biases
     p_b, p_b_a = (values[n] if kind == "external" else values["p0"] for n in ("p_b", "p_b_a"))
-    if not given.has_mag:
+    if not setting.has_mag:
         values["s_b"] = 0.0
     constants = np.array([*values.values()])
     state = np.array(
-        [error_state.start_state(kind, q, values["p0"], p_b, p_b_a, given.has_mag) for q in given.q]
+        [error_state.start_state(kind, q, values["p0"], p_b, p_b_a, setting.has_mag) for q in setting.q]
     )
-    number, dt = error_state.KINDS.index(kind), 1.0 / given.rate_hz
-    n, decay_a = error_state.STATES[number], given.decay(error_state.ACCELERATION_DECAY)
+    number, dt = error_state.KINDS.index(kind), 1.0 / setting.rate_hz
+    n, decay_a = error_state.STATES[number], setting.decay(error_state.ACCELERATION_DECAY)
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
         error_state.run_error_state(
-            number, n, decay_a, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out
+            number, n, decay_a, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out
         )
 
     return Prepared(state, run, 4 if n > 3 else None)
 
 
-def prepare_direction(kind: str, given: Setting) -> Prepared:
+def prepare_direction(kind: str, setting: Setting) -> Prepared:
     """E6."""
-    rows = given.noise_rows(direction.GAINS)
-    values = given.constants(direction.CONSTANTS)
+    rows = setting.noise_rows(direction.GAINS)
+    values = setting.constants(direction.CONSTANTS)
     for decay, drive in (("c_a", "s_a"), ("c_m", "s_m")):
-        values[drive] = sqrt(given.drive(values[drive] ** 2, values[decay]))
-        values[decay] = given.decay(values[decay])
+        values[drive] = sqrt(setting.drive(values[drive] ** 2, values[decay]))
+        values[decay] = setting.decay(values[decay])
     if kind == "vertical":
-        ratio = sqrt(given.rate_hz / GAINS_RATE_HZ)
+        ratio = sqrt(setting.rate_hz / GAINS_RATE_HZ)
         values["sigma_f"] *= ratio
     constants = np.array([*values.values()])
-    up = rotate(conjugate(given.q), np.array([0.0, 0.0, 1.0]))
-    field = rotate(conjugate(given.q), given.m_ref)
+    up = rotate(conjugate(setting.q), np.array([0.0, 0.0, 1.0]))
+    field = rotate(conjugate(setting.q), setting.m_ref)
     state = np.array(
-        [direction.start_state(kind, *start, constants) for start in zip(given.q, up, field, strict=True)]
+        [direction.start_state(kind, *start, constants) for start in zip(setting.q, up, field, strict=True)]
     )
-    number, dt = direction.KINDS.index(kind), 1.0 / given.rate_hz
+    number, dt = direction.KINDS.index(kind), 1.0 / setting.rate_hz
 
     def run(gyr: Floats, acc: Floats, mag: Floats, state: Floats, out: Floats) -> None:
-        direction.run_direction(number, gyr, acc, mag, dt, given.m_ref, rows, constants, state, out)
+        direction.run_direction(number, gyr, acc, mag, dt, setting.m_ref, rows, constants, state, out)
 
     return Prepared(state, run, direction.BIAS if kind == "vertical" else None)
 

@@ -214,10 +214,10 @@ def _take_external(x, P, y, v, sigma_a, c, dx, U, R, H, S, L, W):  # type: ignor
     acceleration.
     """
     count = int(c[M1])
-    at = int(x[HEAD - 2])
+    slot = int(x[HEAD - 2])
     for i in range(3):
-        x[13 + 3 * at + i] = y[i]
-    x[HEAD - 2] = (at + 1) % count
+        x[13 + 3 * slot + i] = y[i]
+    x[HEAD - 2] = (slot + 1) % count
     for i in range(3):
         _point_row(H[i], v, i)
         H[i, 6 + i] = 1.0

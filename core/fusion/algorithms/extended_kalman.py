@@ -187,7 +187,7 @@ def predict_state(x, P, w, dt, sigma_g, b, decay, noise, turn, B, xi, V):  # typ
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _take_vector(x, P, v, r, sigma, one, other, f, J, h, dx, u):  # type: ignore[no-untyped-def]
+def _take_vector(x, P, v, r, sigma, one, second, f, J, h, dx, u):  # type: ignore[no-untyped-def]
     """Rows v = R(q)ᵀ r + x[one:] + x[other:] (eq 42 to 45), omitting blocks that are −1."""
     to_sensor(x, r, f)
     direction_jacobian(x, r, J)
@@ -199,21 +199,21 @@ def _take_vector(x, P, v, r, sigma, one, other, f, J, h, dx, u):  # type: ignore
         if one >= 0:
             h[one + i] = 1.0
             residual -= x[one + i]
-        if other >= 0:
-            h[other + i] = 1.0
-            residual -= x[other + i]
+        if second >= 0:
+            h[second + i] = 1.0
+            residual -= x[second + i]
         take_scalar(P, h, sigma * sigma, residual, dx, u)
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _spread_norms(ring, a, m, has_a, has_m):  # type: ignore[no-untyped-def]
     """Standard deviations of the last norms of accelerometer and magnetometer."""
-    at = int(ring[2 * WINDOW])
+    slot = int(ring[2 * WINDOW])
     if has_a:
-        ring[at] = np.sqrt(dot(a, a))
+        ring[slot] = np.sqrt(dot(a, a))
     if has_m:
-        ring[WINDOW + at] = np.sqrt(dot(m, m))
-    ring[2 * WINDOW] = (at + 1) % WINDOW
+        ring[WINDOW + slot] = np.sqrt(dot(m, m))
+    ring[2 * WINDOW] = (slot + 1) % WINDOW
     spread_a, spread_m, mean_a, mean_m = 0.0, 0.0, 0.0, 0.0
     for i in range(WINDOW):
         mean_a += ring[i] / WINDOW

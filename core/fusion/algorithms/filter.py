@@ -75,11 +75,11 @@ class RestMeans:
 
 
 def _mean(x: Floats) -> Floats:
-    known = np.isfinite(x)
-    count = known.sum(axis=0)
+    is_finite = np.isfinite(x)
+    count = is_finite.sum(axis=0)
     if (count == 0).any():
         raise SignalError("bad_signal", "A sensor has no sample at rest; use another still period.")
-    return np.asarray(np.where(known, x, 0.0).sum(axis=0) / count)
+    return np.asarray(np.where(is_finite, x, 0.0).sum(axis=0) / count)
 
 
 class FusionFilter:
@@ -87,9 +87,9 @@ class FusionFilter:
 
     Parameters
     ----------
-    name : of `ALGORITHMS`. rate_hz : of the samples. rest : initial conditions. params : gains, of the
-        algorithm's class; None = its defaults. magnetometer : whether to use one; None = if `rest` has it and
-        the algorithm supports it.
+    name : of `ALGORITHMS`. rate_hz : of the samples. means : initial conditions. params : gains, of the
+        algorithm's class; None = its defaults. magnetometer : whether to use one; None = if `means` has it
+        and the algorithm supports it.
 
     Raises
     ------
@@ -101,7 +101,7 @@ class FusionFilter:
         self,
         name: str,
         rate_hz: float,
-        rest: RestMeans,
+        means: RestMeans,
         params: AlgorithmGains | None = None,
         *,
         magnetometer: bool | None = None,
@@ -122,8 +122,8 @@ class FusionFilter:
             raise ParameterError(
                 "rate_out_of_range", Message("The rate must be above 0, not {rate_hz:g} Hz.", rate_hz=rate_hz)
             )
-        used = rest.mag is not None if magnetometer is None else magnetometer
-        if self.algorithm.magnetometer == "needed" and not (used and rest.mag is not None):
+        used = means.mag is not None if magnetometer is None else magnetometer
+        if self.algorithm.magnetometer == "needed" and not (used and means.mag is not None):
             raise EstimationError(
                 "no_magnetometer",
                 Message(
@@ -131,9 +131,9 @@ class FusionFilter:
                     label=self.algorithm.label,
                 ),
             )
-        self._uses_mag = used and rest.mag is not None and self.algorithm.magnetometer != "unused"
+        self._uses_mag = used and means.mag is not None and self.algorithm.magnetometer != "unused"
         self._params, self._rate_hz = params, rate_hz
-        self._rest = rest if self._uses_mag else RestMeans(rest.acc, rest.gyr)
+        self._rest = means if self._uses_mag else RestMeans(means.acc, means.gyr)
         self._acc_norm = np.linalg.norm(self._rest.acc, axis=1)[:, None]
         self._mag_norm = (
             np.ones(1) if self._rest.mag is None else np.linalg.norm(self._rest.mag, axis=1)[:, None]
@@ -155,8 +155,8 @@ class FusionFilter:
     @property
     def bias(self) -> Floats | None:
         """Gyroscope bias (S, 3) in rad/s relative to that of the rest; None if the filter has none."""
-        at = self._prepared.bias
-        return None if at is None else self._prepared.state[:, at : at + 3].copy()
+        offset = self._prepared.bias
+        return None if offset is None else self._prepared.state[:, offset : offset + 3].copy()
 
     def reset(self, q: Floats) -> None:
         """Restart at orientations q (S, 4) sensor to world, in the frame of the rest's field."""

@@ -43,11 +43,11 @@ def _rise(x, a, b):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def _memberships(x, row, at):  # type: ignore[no-untyped-def]
-    """Low, middle and high memberships of x with the corners at row[at : at + 8]."""
-    low = 1.0 - _rise(x, row[at], row[at + 1])
-    middle = min(_rise(x, row[at + 2], row[at + 3]), 1.0 - _rise(x, row[at + 4], row[at + 5]))
-    return low, middle, _rise(x, row[at + 6], row[at + 7])
+def _memberships(x, row, offset):  # type: ignore[no-untyped-def]
+    """Low, middle and high memberships of x with the corners at row[offset : at + 8]."""
+    low = 1.0 - _rise(x, row[offset], row[offset + 1])
+    middle = min(_rise(x, row[offset + 2], row[offset + 3]), 1.0 - _rise(x, row[offset + 4], row[offset + 5]))
+    return low, middle, _rise(x, row[offset + 6], row[offset + 7])
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
@@ -55,10 +55,10 @@ def infer_gain(row, acc, mag, gyr):  # type: ignore[no-untyped-def]
     """Minimum for and, maximum for or, truncated sets, their maximum, its centroid on 201 points."""
     low, middle, high = 1.0, 0.0, 0.0
     for i in range(3):
-        at = 10 + 8 * i
-        if not np.isnan(row[at]):
+        offset = 10 + 8 * i
+        if not np.isnan(row[offset]):
             x = acc if i == 0 else mag if i == 1 else gyr
-            is_low, is_middle, is_high = _memberships(x, row, at)
+            is_low, is_middle, is_high = _memberships(x, row, offset)
             low, middle, high = min(low, is_low), max(middle, is_middle), max(high, is_high)
     middle = min(middle, 1.0 - high)
     if low == 0.0 and middle == 0.0 and high == 0.0:

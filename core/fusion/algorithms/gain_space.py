@@ -142,26 +142,26 @@ def _to_plain(value: Any) -> Any:
 def _find_ranges(gains: type[AlgorithmGains], magnetometer: bool) -> dict[str, TuningRange]:
     """Field → range, for those used with or without a magnetometer."""
     hints = get_type_hints(gains, include_extras=True)
-    found = {}
+    ranges = {}
     for f in fields(gains):
         notes = getattr(hints[f.name], "__metadata__", ())
         if notes and (magnetometer or MAGNETIC not in notes):
-            found[f.name] = notes[0]
-    return found
+            ranges[f.name] = notes[0]
+    return ranges
 
 
 def _list_variables(name: str, value: Any, limits: TuningRange) -> list[_Variable]:
     if not isinstance(value, Gain):
         return [_Variable(name, None, None, limits)]
-    found: list[_Variable] = []
+    variables: list[_Variable] = []
     for f in fields(value):
         part = getattr(value, f.name)
         inner = THRESHOLDS.get(f.name, limits)
         if isinstance(part, tuple):
-            found += [_Variable(name, f.name, i, inner) for i, x in enumerate(part) if not isinf(x)]
+            variables += [_Variable(name, f.name, i, inner) for i, x in enumerate(part) if not isinf(x)]
         elif isinstance(part, float) and not isinf(part):
-            found.append(_Variable(name, f.name, None, inner))
-    return found
+            variables.append(_Variable(name, f.name, None, inner))
+    return variables
 
 
 def _read(params: AlgorithmGains, v: _Variable) -> float:
@@ -210,8 +210,8 @@ def _make_gain(value: float, scheme: Scheme, follows: tuple[str, ...], magnetome
 def _without_field(gain: Gain) -> Gain:
     """The same gain without a threshold on the magnetometer; fixed if it followed nothing else."""
     if isinstance(gain, TwoLevelGain):
-        rest = replace(gain, mag=np.inf)
-        return FixedGain(gain.quiet) if isinf(rest.acc) and isinf(rest.gyr) else rest
+        without_mag = replace(gain, mag=np.inf)
+        return FixedGain(gain.quiet) if isinf(without_mag.acc) and isinf(without_mag.gyr) else without_mag
     if isinstance(gain, ThreeLevelGain):
         rest3 = replace(gain, mag=(np.inf, np.inf))
         return FixedGain(gain.quiet) if isinf(rest3.acc[0]) and isinf(rest3.gyr[0]) else rest3

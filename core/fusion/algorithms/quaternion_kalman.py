@@ -153,10 +153,10 @@ def _adapt(tail, y, P, R, window, rules):  # type: ignore[no-untyped-def]
 
     There are four innovations but three axes: the first three are used, as in the thesis.
     """
-    ring, at, count = tail[3 : 3 + 4 * LONGEST_WINDOW], int(tail[-2]), min(tail[-1] + 1.0, window)
+    ring, slot, count = tail[3 : 3 + 4 * LONGEST_WINDOW], int(tail[-2]), min(tail[-1] + 1.0, window)
     for i in range(4):
-        ring[4 * at + i] = y[i]
-    tail[-2], tail[-1] = (at + 1) % window, count
+        ring[4 * slot + i] = y[i]
+    tail[-2], tail[-1] = (slot + 1) % window, count
     if count < window:
         return
     for i in range(3):
@@ -246,11 +246,11 @@ def _make_algebraic(q, v, f, y, J, xi, z):  # type: ignore[no-untyped-def]
         z[i] *= sign
         y[i] = z[i] - q[i]
     rate_jacobian(z, xi)
-    along, across = dot(f, v), dot(f, R[1])
+    along, perpendicular = dot(f, v), dot(f, R[1])
     for i in range(4):
         # ½ Ξ θ: the row of Ξ times −[a]× is a × row
         row = xi[i]
-        up = 0.5 * dot(row, v) / across
+        up = 0.5 * dot(row, v) / perpendicular
         J[i, 0] = 0.5 * (v[1] * row[2] - v[2] * row[1]) - up * along * R[0, 0]
         J[i, 1] = 0.5 * (v[2] * row[0] - v[0] * row[2]) - up * along * R[0, 1]
         J[i, 2] = 0.5 * (v[0] * row[1] - v[1] * row[0]) - up * along * R[0, 2]
@@ -266,7 +266,7 @@ def _make_disturbed(x, a, m, m_ref, mu, y, J, work, four):  # type: ignore[no-un
     y[:] = 0.0
     J[:] = 0.0
     for which in range(2):
-        at = 4 + 3 * which
+        offset = 4 + 3 * which
         if which == 0:
             r[0], r[1], r[2] = 0.0, 0.0, 1.0
         else:
@@ -274,12 +274,12 @@ def _make_disturbed(x, a, m, m_ref, mu, y, J, work, four):  # type: ignore[no-un
         to_sensor(x, r, f)
         direction_jacobian(x, r, H)
         for i in range(3):
-            residual = f[i] + x[at + i] - (a[i] if which == 0 else m[i])
+            residual = f[i] + x[offset + i] - (a[i] if which == 0 else m[i])
             for j in range(4):
                 y[j] -= mu * H[i, j] * residual
                 J[j, 3 * which + i] = mu * H[i, j]
-            y[at + i] -= mu * residual
-            J[at + i, 3 * which + i] = mu
+            y[offset + i] -= mu * residual
+            J[offset + i, 3 * which + i] = mu
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]

@@ -72,11 +72,11 @@ def make_points(
         share = sqrt((1.0 - weight) / n)
         C = np.linalg.cholesky(np.eye(n) - share**2)
         inverse = np.linalg.inv(C)
-        others = np.diag(weight * share**2 * inverse @ np.ones((n, n)) @ inverse.T)
+        remaining = np.diag(weight * share**2 * inverse @ np.ones((n, n)) @ inverse.T)
         first = np.full((1, n), -share / sqrt(weight))
-        weights = np.concatenate(([weight], others))
+        weights = np.concatenate(([weight], remaining))
         # in rows, as the other sets are: of columns the loop would be compiled once more
-        return np.ascontiguousarray(np.concatenate((first, (C / np.sqrt(others)).T))), weights, weights
+        return np.ascontiguousarray(np.concatenate((first, (C / np.sqrt(remaining)).T))), weights, weights
     if kind != "spherical_simplex":
         raise ParameterError("gain_out_of_range", Message("No set of sigma points '{kind}'.", kind=kind))
     w1 = (1.0 - weight) / (n + 1)

@@ -148,15 +148,15 @@ def advance_swarm(swarm: Swarm, cost: Cost, start: Floats, rules: SwarmRules, se
     )
     limit = rules.longest_step * (swarm.high - swarm.low)
     velocity = np.clip(velocity, -limit, limit)
-    at = np.clip(swarm.at + velocity, swarm.low, swarm.high)
-    costs = cost(at)
+    positions = np.clip(swarm.at + velocity, swarm.low, swarm.high)
+    costs = cost(positions)
     better = costs < swarm.cost
     return replace(
         swarm,
         step=swarm.step + 1,
-        at=at,
+        at=positions,
         velocity=velocity,
-        own=np.where(better[:, None], at, swarm.own),
+        own=np.where(better[:, None], positions, swarm.own),
         cost=np.where(better, costs, swarm.cost),
     )
 
@@ -169,23 +169,23 @@ def _begin_round(
         first = int(np.argmin(swarm.cost))
         ended = np.concatenate((ended, swarm.own[first : first + 1]))
         ended_cost = np.append(ended_cost, swarm.cost[first])
-    known = start[None] if not len(ended) else ended[:0] if is_random else ended
+    anchors = start[None] if not len(ended) else ended[:0] if is_random else ended
     if is_random:
         low, high = rng.uniform(0.0, 0.5, len(start)), rng.uniform(0.5, 1.0, len(start))
     else:
-        low, high = known.min(0) - MARGIN, known.max(0) + MARGIN
+        low, high = anchors.min(0) - MARGIN, anchors.max(0) + MARGIN
     low, high = (np.clip(np.array(x), 0.0, 1.0) for x in (low, high))
-    if len(known):
-        low, high = np.minimum(low, known.min(0)), np.maximum(high, known.max(0))
-    at = rng.uniform(low, high, (rules.particles, len(start)))
-    known = known[: rules.particles]
-    at[: len(known)] = known
+    if len(anchors):
+        low, high = np.minimum(low, anchors.min(0)), np.maximum(high, anchors.max(0))
+    positions = rng.uniform(low, high, (rules.particles, len(start)))
+    anchors = anchors[: rules.particles]
+    positions[: len(anchors)] = anchors
     return Swarm(
         swarm.step,
-        at,
-        np.zeros_like(at),
-        at,
-        np.full(len(at), np.inf),
+        positions,
+        np.zeros_like(positions),
+        positions,
+        np.full(len(positions), np.inf),
         low,
         high,
         ended,
@@ -206,8 +206,8 @@ def read_swarm(content: bytes, problem: str) -> Swarm:
     ParameterError `not_a_checkpoint`; `other_problem` if it belongs to a different search.
     """
     try:
-        found = json.loads(content)
-        swarm, searched = Swarm.from_json(found["swarm"]), str(found["problem"])
+        checkpoint = json.loads(content)
+        swarm, searched = Swarm.from_json(checkpoint["swarm"]), str(checkpoint["problem"])
     except (ValueError, KeyError, TypeError) as error:
         raise ParameterError("not_a_checkpoint", "The file is no checkpoint of a tuning.") from error
     if searched != problem:

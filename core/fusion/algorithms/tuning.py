@@ -55,19 +55,19 @@ class TrialSplit:
                     validate=len(self.validate),
                 ),
             )
-        seen: dict[str, str] = {}
+        names_by_digest: dict[str, str] = {}
         for trial in (*self.train, *self.validate):
             for mark in (trial.name, trial.sha256):
-                if mark in seen:
+                if mark in names_by_digest:
                     raise ParameterError(
                         "trial_twice",
                         Message(
                             "{mark} and {name} are the same recording; leave one out.",
-                            mark=seen[mark],
+                            mark=names_by_digest[mark],
                             name=trial.name,
                         ),
                     )
-                seen[mark] = trial.name
+                names_by_digest[mark] = trial.name
 
     @classmethod
     def by_name(cls, trials: Sequence[ReferenceTrial], validate: Collection[str]) -> TrialSplit:
@@ -150,20 +150,24 @@ class GainTuner:
         rules: SwarmRules | None = None,
         code_version: str = "",
     ) -> None:
-        found = find_algorithm(algorithm)
+        algorithm_entry = find_algorithm(algorithm)
         without = [t.name for t in (*split.train, *split.validate) if not t.has_magnetometer]
-        uses_mag = found.magnetometer != "unused" and magnetometer is not False and not without
-        if not uses_mag and (found.magnetometer == "needed" or (magnetometer and without)):
-            why = (
+        uses_mag = algorithm_entry.magnetometer != "unused" and magnetometer is not False and not without
+        if not uses_mag and (algorithm_entry.magnetometer == "needed" or (magnetometer and without)):
+            reason = (
                 Message("{without} have none", without=", ".join(without))
                 if without
                 else "it is told to go without"
             )
             raise EstimationError(
                 "no_magnetometer",
-                Message("{label} is set to use a magnetometer, but {why}.", label=found.label, why=why),
+                Message(
+                    "{label} is set to use a magnetometer, but {why}.",
+                    label=algorithm_entry.label,
+                    why=reason,
+                ),
             )
-        params = found.gains() if start is None else start
+        params = algorithm_entry.gains() if start is None else start
         self._name, self._split, self._seed, self._version = algorithm, split, seed, code_version
         self._before, self._uses_mag, self._rules = params, uses_mag, rules or SwarmRules()
         levels = params if scheme is None else choose_scheme(params, scheme, magnetometer=uses_mag)
@@ -208,9 +212,11 @@ class GainTuner:
         while swarm.step < self._rules.steps:
             swarm = advance_swarm(swarm, cost, start, self._rules, self._seed)
             keep(write_swarm(swarm, self._problem), swarm.step / self._rules.steps, self._say(swarm))
-        after = self._space.decode(swarm.best[0])
-        both = (self._before, after)
-        return self._report(after, score(both, self._split.train), score(both, self._split.validate))
+        tuned = self._space.decode(swarm.best[0])
+        candidates = (self._before, tuned)
+        return self._report(
+            tuned, score(candidates, self._split.train), score(candidates, self._split.validate)
+        )
 
     def _score(self, task: tuple[AlgorithmGains, ReferenceTrial]) -> float:
         """RMS error in rad; inf if the filter diverges."""
@@ -233,7 +239,7 @@ class GainTuner:
             best=best,
         )
 
-    def _report(self, after: AlgorithmGains, trained: Floats, validated: Floats) -> TuningResult:
+    def _report(self, tuned: AlgorithmGains, trained: Floats, validated: Floats) -> TuningResult:
         old, new = validated.mean(axis=1)
         improved = bool(new < (1.0 - LEAST_GAIN) * old)
         words = f"{_say_error(old, 2)} before, {_say_error(new, 2)} after, on trials not fitted to"
@@ -249,7 +255,7 @@ class GainTuner:
             algorithm=self._name,
             magnetometer=self._uses_mag,
             start=gains_to_json(self._before),
-            gains=gains_to_json(after),
+            gains=gains_to_json(tuned),
             trained=_pairs(self._split.train, trained),
             validated=_pairs(self._split.validate, validated),
             improved=improved,

@@ -101,7 +101,7 @@ def predict_covariance(P, F, decay, work):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def take_scalar(P, d, K, at, h, m, residual, variance):  # type: ignore[no-untyped-def]
+def take_scalar(P, d, K, columns, h, m, residual, variance):  # type: ignore[no-untyped-def]
     """Scalar update with residual = Σ h_j error[at_j] + noise, j < m, of P and the estimate d, both in place.
 
     Only the lower triangle of P is used; K (n,) is scratch for the gain.
@@ -111,14 +111,14 @@ def take_scalar(P, d, K, at, h, m, residual, variance):  # type: ignore[no-untyp
     for i in range(n):
         K[i] = 0.0
     for j in range(m):
-        a, f = at[j], h[j]
+        a, f = columns[j], h[j]
         for i in range(a):
             K[i] += P[a, i] * f
         for i in range(a, n):
             K[i] += P[i, a] * f
     for j in range(m):
-        s += h[j] * K[at[j]]
-        e -= h[j] * d[at[j]]
+        s += h[j] * K[columns[j]]
+        e -= h[j] * d[columns[j]]
     e /= s
     for i in range(n):
         k = K[i] / s

@@ -127,12 +127,12 @@ class SelfCalibratingFilter:
         gyr, acc, field = self._check(gyr, acc, mag)
         n, sensors = gyr.shape[1], len(gyr)
         q, dt = np.empty((sensors, n, 4)), 1.0 / self.rate_hz
-        judged, still = np.empty((n, at.JUDGED)), np.empty(n, np.bool_)
+        features, still = np.empty((n, at.JUDGED)), np.empty(n, np.bool_)
         raw, F, d, decay = NOTHING
         for s in range(sensors):
-            judge_motion(self._motion[s], self._counters[s], gyr[s], acc[s], dt, judged, still)
+            judge_motion(self._motion[s], self._counters[s], gyr[s], acc[s], dt, features, still)
             run_forward(
-                *self._state(s), gyr[s], acc[s], field[s], judged, still, dt, self._weights,
+                *self._state(s), gyr[s], acc[s], field[s], features, still, dt, self._weights,
                 q[s], raw, F, d, decay, F, F,
             )  # fmt: skip
         return self._finish(q)
@@ -152,16 +152,16 @@ class SelfCalibratingFilter:
         interval = count_interval(dt)
         size = n // interval
         raw, F, d, decay = np.empty((n, 4)), np.empty((size, 6, m)), np.empty((size, m)), np.empty((size, 1))
-        before, after = np.empty((size, m, m)), np.empty((size, m, m))
+        previous_P, predicted_P = np.empty((size, m, m)), np.empty((size, m, m))
         for s in range(sensors):
-            judged, still = _judge_both_ways(self._motion[s], self._counters[s], gyr[s], acc[s], dt)
+            features, still = _judge_both_ways(self._motion[s], self._counters[s], gyr[s], acc[s], dt)
             x, P, _, counters, _ = self._state(s)
             start_from_first(x, P, self._weights, dt, counters, gyr[s], acc[s], field[s])
             run_forward(
-                *self._state(s), gyr[s], acc[s], field[s], judged, still, dt, self._weights,
-                q[s], raw, F, d, decay, before, after,
+                *self._state(s), gyr[s], acc[s], field[s], features, still, dt, self._weights,
+                q[s], raw, F, d, decay, previous_P, predicted_P,
             )  # fmt: skip
-            smooth_backward(interval, raw, F, d, decay, before, after, q[s])
+            smooth_backward(interval, raw, F, d, decay, previous_P, predicted_P, q[s])
         return self._finish(q)
 
     @property
@@ -203,8 +203,12 @@ class SelfCalibratingFilter:
                     shapes=shapes,
                 ),
             )
-        made = [np.ascontiguousarray(np.swapaxes(np.asarray(v, np.float64), 0, 1)) for v in used]
-        return made[0], made[1], made[2] if self.uses_magnetometer else np.empty((sensors, 0, 3))
+        contiguous = [np.ascontiguousarray(np.swapaxes(np.asarray(v, np.float64), 0, 1)) for v in used]
+        return (
+            contiguous[0],
+            contiguous[1],
+            contiguous[2] if self.uses_magnetometer else np.empty((sensors, 0, 3)),
+        )
 
     def _finish(self, q: Floats) -> Floats:
         if not np.isfinite(q).all():
@@ -231,8 +235,8 @@ def _judge_both_ways(
 ) -> tuple[Floats, Bools]:
     """Motion (n, 3) without lag, and rest (n,) detected from either end."""
     n = len(gyr)
-    judged, still, other = np.empty((n, at.JUDGED)), np.empty(n, np.bool_), np.empty(n, np.bool_)
-    judge_motion(u, counters, gyr, acc, dt, judged, still)
+    features, still, backward = np.empty((n, at.JUDGED)), np.empty(n, np.bool_), np.empty(n, np.bool_)
+    judge_motion(u, counters, gyr, acc, dt, features, still)
     judge_motion(
         np.zeros(at.MOTION),
         np.zeros(at.COUNTERS, np.int64),
@@ -240,9 +244,9 @@ def _judge_both_ways(
         np.ascontiguousarray(acc[::-1]),
         dt,
         np.empty((n, at.JUDGED)),
-        other,
+        backward,
     )
     if n:
         for j in (at.J_SPEED_SQUARE, at.J_SLOW_SQUARE):
-            average_backwards(judged[:, j], dt)
-    return judged, still | other[::-1]
+            average_backwards(features[:, j], dt)
+    return features, still | backward[::-1]

@@ -95,10 +95,10 @@ def count_interval(dt):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def add_sample(x, sums, counters, ring, gyr, acc, mag, judged, still, dt, work):  # type: ignore[no-untyped-def]
+def add_sample(x, sums, counters, ring, gyr, acc, mag, features, still, dt, work):  # type: ignore[no-untyped-def]
     """Integrate orientation and velocity over a sample and add to the interval's sums; mag (0,) without."""
     middle, R = work[0, :4], work[1:4, :3]
-    shaking = judged[J_SHAKING]
+    shaking = features[J_SHAKING]
     ox = gyr[0] - x[4] - x[24] * shaking
     oy = gyr[1] - x[5] - x[25] * shaking
     oz = gyr[2] - x[6] - x[26] * shaking
@@ -141,8 +141,8 @@ def add_sample(x, sums, counters, ring, gyr, acc, mag, judged, still, dt, work):
     x[9] += az * dt
     sums[S_RATE_SQUARE] += wx * wx + wy * wy + wz * wz
     sums[S_ACC_SQUARE] += ax * ax + ay * ay + az * az
-    sums[S_SPEED_SQUARE] += judged[J_SPEED_SQUARE]
-    sums[S_SLOW_SQUARE] += judged[J_SLOW_SQUARE]
+    sums[S_SPEED_SQUARE] += features[J_SPEED_SQUARE]
+    sums[S_SLOW_SQUARE] += features[J_SLOW_SQUARE]
     sums[S_SHAKING] += shaking
     for j in range(3):
         sums[S_GYR + j] += gyr[j]
@@ -155,21 +155,21 @@ def add_sample(x, sums, counters, ring, gyr, acc, mag, judged, still, dt, work):
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def _add_field(x, sums, counters, ring, mag, dt, middle, w, W, work):  # type: ignore[no-untyped-def]
     """Add the field, levelled by the orientation at the time of its measurement."""
-    at = counters[C_SEEN] % RING
+    slot = counters[C_SEEN] % RING
     for j in range(4):
-        ring[at, j] = middle[j]
+        ring[slot, j] = middle[j]
     for j in range(3):
-        ring[at, 4 + j] = w[j]
+        ring[slot, 4 + j] = w[j]
     if x[NORM] <= 0.0 or not is_known(mag):
         return
     delay = min(max(x[MAG_DELAY + SHIFT], -0.02), (RING - 2) * dt)
     back = min(max(floor(delay / dt + 0.5), 0), max(counters[C_RUN], 0))
-    rest = delay - back * dt
-    at = (counters[C_SEEN] - back) % RING
+    remaining_s = delay - back * dt
+    slot = (counters[C_SEEN] - back) % RING
     q, R = work[4, :4], work[5:8, :3]
     for j in range(4):
-        q[j] = ring[at, j]
-    compiled.turn(q, -rest * ring[at, 4], -rest * ring[at, 5], -rest * ring[at, 6])
+        q[j] = ring[slot, j]
+    compiled.turn(q, -remaining_s * ring[slot, 4], -remaining_s * ring[slot, 5], -remaining_s * ring[slot, 6])
     compiled.to_matrix(q, R)
     n = x[NORM]
     mx, my, mz = mag[0] / n, mag[1] / n, mag[2] / n
@@ -189,7 +189,7 @@ def _add_field(x, sums, counters, ring, mag, dt, middle, w, W, work):  # type: i
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # type: ignore[no-untyped-def]
+def correct(x, P, sums, counters, dt, p, F, d, decay, previous_P, predicted_P, work):  # type: ignore[no-untyped-def]
     """End an interval: propagate P, update with velocity, field and rest, inject the errors into x; reset the
     sums.
 
@@ -209,8 +209,8 @@ def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # t
     speed_square, slow_square = sums[S_SPEED_SQUARE] / n, sums[S_SLOW_SQUARE] / n
     way = 0.0 if counters[C_REST] == n else sqrt(3.0 * speed_square) * duration
     decay[0] = exp(-way / p.field_length_m - FIELD_RATE * duration)
-    if len(before):
-        before[:] = P
+    if len(previous_P):
+        previous_P[:] = P
     predict_covariance(P, F, decay[0], work)
     turned = (p.gyro_noise**2 + p.gyro_rate_noise**2 * rate_square) * duration + LOST_TURN * sums[S_LOST]
     pushed = (ACC_NOISE**2 + ACC_SHOCK_NOISE**2 * acc_square) * duration + LOST_PUSH * sums[S_LOST]
@@ -221,40 +221,40 @@ def correct(x, P, sums, counters, dt, p, F, d, decay, before, after, work):  # t
     off, field_variance = np.zeros(3), 0.0
     if m == WITH_MAG:
         field_variance = _expect_field(x, P, sums, counters, dt, duration, p, rate_square, decay[0], off)
-    if len(after):
-        after[:] = P
+    if len(predicted_P):
+        predicted_P[:] = P
     d[:] = 0.0
-    at, h, K = np.zeros(7, np.int64), np.zeros(7), work[0]
+    indices, h, K = np.zeros(7, np.int64), np.zeros(7), work[0]
     h[0] = 1.0
     # what is left of the velocity is as large as the motion, less where that swings fast, and soon new
     bounding = p.velocity_gain**2 * min(speed_square, sqrt(speed_square * slow_square)) + LEAST_SPEED**2
     spread = 2.0 * VELOCITY_TIME_S * bounding / duration
     for j in range(3):
-        at[0] = SPEED + j
-        take_scalar(P, d, K, at, h, 1, -x[SPEED + SHIFT + j], spread)
+        indices[0] = SPEED + j
+        take_scalar(P, d, K, indices, h, 1, -x[SPEED + SHIFT + j], spread)
     if m == WITH_MAG and counters[C_MAG] > 0 and x[JUMPING] == 0.0:
         k = 1.0 / counters[C_MAG]
         for j in range(3):
             for i in range(3):
-                at[i] = IRON + i
+                indices[i] = IRON + i
                 h[i] = _turned_since_start(x, sums, counters, j, i)
-            at[3], h[3] = FIELD + j, 1.0
-            at[4], h[4] = REGION + j, 1.0
-            at[5], h[5] = MAG_DELAY, sums[S_MAG_CROSS + j] * k
-            at[6], h[6] = TILT + 2, x[NORTH + 1]
+            indices[3], h[3] = FIELD + j, 1.0
+            indices[4], h[4] = REGION + j, 1.0
+            indices[5], h[5] = MAG_DELAY, sums[S_MAG_CROSS + j] * k
+            indices[6], h[6] = TILT + 2, x[NORTH + 1]
             # of the tilt a field says nothing that gravity does not say better: heading alone is taken
-            take_scalar(P, d, K, at, h, 7 if j == 0 else 6, off[j], field_variance)
+            take_scalar(P, d, K, indices, h, 7 if j == 0 else 6, off[j], field_variance)
     if counters[C_REST] < n:
         x[PLACE_SUMS] = 0.0
     elif m == WITH_MAG and _is_back(x, P, sums, counters, duration):
-        at[0], h[0] = TILT + 2, x[NORTH + 1]
-        take_scalar(P, d, K, at, h, 1, x[PLACE], PLACE_SD**2)
+        indices[0], h[0] = TILT + 2, x[NORTH + 1]
+        take_scalar(P, d, K, indices, h, 1, x[PLACE], PLACE_SD**2)
     if counters[C_REST] == n:
         h[0] = 1.0
         for j in range(3):
-            at[0] = BIAS + j
+            indices[0] = BIAS + j
             take_scalar(
-                P, d, K, at, h, 1, sums[S_GYR + j] / n - x[BIAS + SHIFT + j], REST_NOISE**2 / duration
+                P, d, K, indices, h, 1, sums[S_GYR + j] / n - x[BIAS + SHIFT + j], REST_NOISE**2 / duration
             )
     for i in range(m):
         for j in range(i):
@@ -348,7 +348,25 @@ def _part_from_start(x, P, p):  # type: ignore[no-untyped-def]
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
 def run_forward(  # type: ignore[no-untyped-def]
-    x, P, sums, counters, ring, gyr, acc, mag, judged, still, dt, p, out, raw, F, d, decay, before, after
+    x,
+    P,
+    sums,
+    counters,
+    ring,
+    gyr,
+    acc,
+    mag,
+    features,
+    still,
+    dt,
+    p,
+    out,
+    raw,
+    F,
+    d,
+    decay,
+    previous_P,
+    predicted_P,
 ):
     """Advance one sensor over a block and write q (n, 4).
 
@@ -362,16 +380,16 @@ def run_forward(  # type: ignore[no-untyped-def]
     work = np.empty((8, 4))
     interval = count_interval(dt)
     for i in range(len(gyr)):
-        known = True
+        is_finite = True
         for j in range(3):
-            known = known and np.isfinite(gyr[i, j]) and np.isfinite(acc[i, j])
+            is_finite = is_finite and np.isfinite(gyr[i, j]) and np.isfinite(acc[i, j])
         if counters[C_START] >= 0:
-            if known:
+            if is_finite:
                 take_start(x, P, p, dt, counters, gyr[i], acc[i], mag[i] if uses_mag else none)
             for j in range(4):
                 out[i, j] = x[j]
             continue
-        if known:
+        if is_finite:
             add_sample(
                 x,
                 sums,
@@ -380,7 +398,7 @@ def run_forward(  # type: ignore[no-untyped-def]
                 gyr[i],
                 acc[i],
                 mag[i] if uses_mag else none[:0],
-                judged[i],
+                features[i],
                 still[i],
                 dt,
                 work,
@@ -398,7 +416,9 @@ def run_forward(  # type: ignore[no-untyped-def]
                 raw[i, j] = x[j]
         if counters[C_INTERVAL] == interval:
             if recorded:
-                correct(x, P, sums, counters, dt, p, F[k], d[k], decay[k], before[k], after[k], wide)
+                correct(
+                    x, P, sums, counters, dt, p, F[k], d[k], decay[k], previous_P[k], predicted_P[k], wide
+                )
                 k += 1
             else:
                 correct(x, P, sums, counters, dt, p, F1, d1, decay1, nothing, nothing, wide)
@@ -407,18 +427,18 @@ def run_forward(  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def smooth_backward(interval, raw, F, d, decay, before, after, out):  # type: ignore[no-untyped-def]
+def smooth_backward(interval, raw, F, d, decay, previous_P, predicted_P, out):  # type: ignore[no-untyped-def]
     """Backward smoothing over the intervals (Rauch, Tung and Striebel); writes out (n, 4).
 
     Samples after the last whole interval are unchanged.
     """
-    m = before.shape[1]
+    m = previous_P.shape[1]
     error, end, y, z, L = np.zeros(m), np.empty(m), np.empty(m), np.empty(m), np.empty((m, m))
-    for k in range(len(before) - 1, -1, -1):
+    for k in range(len(previous_P) - 1, -1, -1):
         for j in range(m):
             end[j] = d[k, j] + error[j]  # at the end of the interval, before its correction
             y[j] = end[j]
-        solve(after[k], y, L)
+        solve(predicted_P[k], y, L)
         if m == WITH_MAG:
             for j in range(FIELD, FIELD + 3):
                 y[j] *= decay[k, 0]
@@ -430,7 +450,7 @@ def smooth_backward(interval, raw, F, d, decay, before, after, out):  # type: ig
         for j in range(m):
             t = 0.0
             for c in range(m):
-                t += before[k, j, c] * z[c]
+                t += previous_P[k, j, c] * z[c]
             error[j] = t  # at its start
         for i in range(interval):
             share, row = (i + 1) / interval, k * interval + i

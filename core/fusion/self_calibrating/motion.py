@@ -71,7 +71,7 @@ def tilt(q, a, b, c):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)  # type: ignore[misc, unused-ignore]
-def judge_motion(u, counters, gyr, acc, dt, judged, still):  # type: ignore[no-untyped-def]
+def judge_motion(u, counters, gyr, acc, dt, features, still):  # type: ignore[no-untyped-def]
     """Advance the state u (22,) and write judged (n, 3), see the layout, and still (n,), True at rest.
 
     The speed is integrated from the acceleration without its slow part and then high-passed again: the result
@@ -83,13 +83,13 @@ def judge_motion(u, counters, gyr, acc, dt, judged, still):  # type: ignore[no-u
     mean = 1.0 - exp(-dt / REST_MEAN_S)
     none = np.zeros(3)
     for i in range(len(gyr)):
-        known = True
+        is_finite = True
         for j in range(3):
-            known = known and np.isfinite(gyr[i, j]) and np.isfinite(acc[i, j])
-        if not known:
+            is_finite = is_finite and np.isfinite(gyr[i, j]) and np.isfinite(acc[i, j])
+        if not is_finite:
             u[M_REST] = 0.0
-            judged[i, J_SPEED_SQUARE], judged[i, J_SLOW_SQUARE] = u[M_SQUARE], u[M_SLOW_SQUARE]
-            judged[i, J_SHAKING], still[i] = 0.0, False
+            features[i, J_SPEED_SQUARE], features[i, J_SLOW_SQUARE] = u[M_SQUARE], u[M_SLOW_SQUARE]
+            features[i, J_SHAKING], still[i] = 0.0, False
             continue
         first = counters[C_MOTION] == 0
         counters[C_MOTION] += 1
@@ -117,8 +117,8 @@ def judge_motion(u, counters, gyr, acc, dt, judged, still):  # type: ignore[no-u
             u[M_SQUARE], u[M_SLOW_SQUARE] = total / 3.0, SLOW_SHARE * lasting / 3.0
         u[M_SQUARE] += slow * (total / 3.0 - u[M_SQUARE])
         u[M_SLOW_SQUARE] += slow * (SLOW_SHARE * lasting / 3.0 - u[M_SLOW_SQUARE])
-        judged[i, J_SPEED_SQUARE], judged[i, J_SLOW_SQUARE] = u[M_SQUARE], u[M_SLOW_SQUARE]
-        judged[i, J_SHAKING] = shaken / GRAVITY_MPS2**2
+        features[i, J_SPEED_SQUARE], features[i, J_SLOW_SQUARE] = u[M_SQUARE], u[M_SLOW_SQUARE]
+        features[i, J_SHAKING] = shaken / GRAVITY_MPS2**2
         if off_rate > REST_RATE**2 or off_force > REST_FORCE**2 or largest > REST_RATE:
             u[M_REST] = 0.0
         else:

@@ -79,14 +79,14 @@ def take_start(x, P, p, dt, counters, gyr, acc, mag):  # type: ignore[no-untyped
     else:
         compiled.turn(q, gyr[0] * dt, gyr[1] * dt, gyr[2] * dt)
     compiled.to_matrix(q, R)
-    seen = uses_mag and is_known(mag)
+    has_field = uses_mag and is_known(mag)
     for j in range(3):
         x[SUM_ACC + j] += R[j, 0] * acc[0] + R[j, 1] * acc[1] + R[j, 2] * acc[2]
-        if seen:
+        if has_field:
             x[SUM_MAG + j] += R[j, 0] * mag[0] + R[j, 1] * mag[1] + R[j, 2] * mag[2]
         if abs(gyr[j]) > MOVING_RATE or abs(acc[j] - x[FIRST_ACC + j]) > MOVING_FORCE:
             x[MOVED] = 1.0
-    if seen:
+    if has_field:
         counters[C_START] += 1
     counters[C_SEEN] += 1
     field, first = x[SUM_MAG : SUM_MAG + 3] / max(1, counters[C_START]), np.empty(4)

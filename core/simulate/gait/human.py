@@ -101,8 +101,8 @@ def move(plan: Plan, walker: Walker, rate_hz: float, chair: tuple[ChairChange, .
     mid_hip = np.column_stack((xy, z))
     if chair:
         seat, thigh = sit_and_rise(t, chair), walker.anatomy.thigh
-        behind = np.stack((-np.cos(heading), -np.sin(heading), np.zeros(len(t))), axis=-1)
-        mid_hip = mid_hip + thigh * (seat.back[:, None] * behind - seat.drop[:, None] * [0.0, 0.0, 1.0])
+        backward = np.stack((-np.cos(heading), -np.sin(heading), np.zeros(len(t))), axis=-1)
+        mid_hip = mid_hip + thigh * (seat.back[:, None] * backward - seat.drop[:, None] * [0.0, 0.0, 1.0])
         q_pelvis = multiply(q_pelvis, about(2, -seat.pelvis_rad))
 
     q: dict[Segment, Floats] = {"pelvis": q_pelvis}

@@ -106,11 +106,11 @@ def load_share(t: Floats, plan: Plan, timings: Mapping[Side, FootTiming], side: 
         if step.closes:
             shifts.append((step.time_s, step.time_s + 0.35, 0.5))
     share, jumps, now = np.zeros(len(t)), np.zeros(len(t) + 1), 0.5
-    for start, end, then in shifts:
+    for start, end, next_share in shifts:
         i, j = np.searchsorted(t, (start, end))
-        share[i:j] += (then - now) * smoothstep((t[i:j] - start) / (end - start))
-        jumps[j] += then - now
-        now = then
+        share[i:j] += (next_share - now) * smoothstep((t[i:j] - start) / (end - start))
+        jumps[j] += next_share - now
+        now = next_share
     return 0.5 + share + np.cumsum(jumps[:-1])
 
 
@@ -128,8 +128,8 @@ def compute_pelvis_height(
     """Mid-hip height (n,) in m at which the loaded leg has its target knee flexion."""
     total = np.zeros(len(q))
     for side in SIDES:
-        rest, gait = walker.standing_knee_rad, walker.sides[side]
-        target = rest + amplitude * (knee_flexion(gait, phases[side]) - rest)
+        standing_rad, gait = walker.standing_knee_rad, walker.sides[side]
+        target = standing_rad + amplitude * (knee_flexion(gait, phases[side]) - standing_rad)
         knee = smooth_max(target, gait.knee_min_rad, DEGREE)
         reach = leg_reach(walker.anatomy, smooth(knee, size_window(plan, rate_hz, 0.02)))
         total += shares[side] * _hip_height(walker, side, xy, q, ankles[side], reach)
@@ -142,7 +142,7 @@ def guard(
     xy: Floats,
     q: Floats,
     ankles: Mapping[Side, Floats],
-    where: Mapping[Side, Bools],
+    loaded: Mapping[Side, Bools],
     rate_hz: float,
 ) -> tuple[Floats, float]:
     """Lower the pelvis (n,) where a leg would be overstretched; also returns the largest lowering required
@@ -152,7 +152,7 @@ def guard(
     for side in SIDES:
         reach = leg_reach(walker.anatomy, walker.sides[side].knee_min_rad - 0.5 * DEGREE)
         limit = _hip_height(walker, side, xy, q, ankles[side], reach)
-        excess = np.maximum(excess, np.where(where[side], z - limit, 0.0))
+        excess = np.maximum(excess, np.where(loaded[side], z - limit, 0.0))
     worst = float(excess.max())
     if worst <= 0.0:
         return z, 0.0

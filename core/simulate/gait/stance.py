@@ -78,8 +78,8 @@ class StanceFoot:
     def landing_pitch(self, i: int) -> float:
         """Pitch in rad at the contact of footprint i."""
         foot = self.prints[i]
-        wanted = self.walker.sides[self.side].contact_pitch_rad + foot.pitch_rad
-        return wanted * self.walker.landing_amplitude(foot.step_m)
+        target_rad = self.walker.sides[self.side].contact_pitch_rad + foot.pitch_rad
+        return target_rad * self.walker.landing_amplitude(foot.step_m)
 
     def push_off_pitch(self, i: int, t: Floats) -> Floats:
         """Pitch (n,) in rad on footprint i from heel-off on (0 before), extrapolated past release."""
@@ -94,8 +94,8 @@ class StanceFoot:
         # the step that counts is the other foot's, which this foot trails: of a limping person's two
         # lengths its own next one would leave the heel too low for a long step and too high for a short one
         gait = self.walker.sides[self.side]
-        other = self.walker.sides["left" if self.side == "right" else "right"]
-        step_m = self.prints[i + 1].step_m * (other.length_factor / gait.length_factor)
+        other_side = self.walker.sides["left" if self.side == "right" else "right"]
+        step_m = self.prints[i + 1].step_m * (other_side.length_factor / gait.length_factor)
         push = gait.push * self.walker.amplitude(step_m)
         rise = FOOT_PITCH(phase) - FOOT_PITCH(np.asarray(phase_0))
         return np.where(u > 0.0, push * rise * smoothstep(u / 0.45), 0.0)
@@ -135,17 +135,17 @@ class StanceFoot:
         bounds = [0, *middles.tolist(), n]
         for i, foot in enumerate(self.prints):
             part = slice(bounds[i], bounds[i + 1])
-            at = t[part]
-            angle = np.zeros(len(at))
-            landing = np.zeros(len(at), bool)
+            times = t[part]
+            angle = np.zeros(len(times))
+            landing = np.zeros(len(times), bool)
             if i:
                 contact, flat = timing.contact[i - 1], timing.flat[i - 1]
-                landing = at < flat
-                angle += self.landing_pitch(i) * (1.0 - smoothstep((at - contact) / (flat - contact)))
+                landing = times < flat
+                angle += self.landing_pitch(i) * (1.0 - smoothstep((times - contact) / (flat - contact)))
             if i < len(timing.release):
-                angle += self.push_off_pitch(i, at)
+                angle += self.push_off_pitch(i, times)
             q = foot_orientation(foot.foot_rad, angle)
-            early = self.on_landing(i, q, angle) if i else np.empty((len(at), 3))
+            early = self.on_landing(i, q, angle) if i else np.empty((len(times), 3))
             ankle[part] = np.where(landing[:, None], early, self.on_forefoot(i, q, angle))
             pitch[part] = angle
             heading[part] = foot.foot_rad

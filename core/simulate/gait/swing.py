@@ -84,13 +84,13 @@ def _swing(
     stance: StanceFoot, i: int, t: Floats, u: Floats, hip: Floats, q_pelvis: Floats
 ) -> tuple[Floats, Floats, Floats, Floats, float]:
     walker, side = stance.walker, stance.side
-    before, landing = stance.prints[i], stance.prints[i + 1]
+    previous, landing = stance.prints[i], stance.prints[i + 1]
     scale = walker.amplitude(landing.step_m)
     phase = RELEASE_PHASE + (1.0 - RELEASE_PHASE) * u
 
     free, lean = _free_leg(stance, i, phase, scale, hip, q_pelvis)
     dorsiflexion = ankle_dorsiflexion(walker.sides[side], phase) * (1.0 if scale > 0.5 else scale)
-    heading = before.foot_rad + (landing.path_rad - before.path_rad) * smoothstep(u)
+    heading = previous.foot_rad + (landing.path_rad - previous.path_rad) * smoothstep(u)
     free_pitch = dorsiflexion - np.arctan2(
         np.cos(heading) * lean[:, 0] + np.sin(heading) * lean[:, 1], lean[:, 2]
     )
@@ -103,8 +103,8 @@ def _swing(
     landing_pitch = stance.landing_pitch(i + 1) - approach
     air_pitch = free_pitch + join(u, leaving_pitch - free_pitch, landing_pitch - free_pitch)
     if walker.lands_rising:
-        above = smooth_max(air_pitch - landing_pitch, 0.0, 1.5 * DEGREE)
-        air_pitch = air_pitch - smoothstep((u - 0.28) / 0.22) * above
+        excess = smooth_max(air_pitch - landing_pitch, 0.0, 1.5 * DEGREE)
+        air_pitch = air_pitch - smoothstep((u - 0.28) / 0.22) * excess
 
     leaving = 1.0 - smoothstep(u / LEAVE)
     arriving = smoothstep((u - 1.0 + LAND) / LAND)
@@ -159,8 +159,8 @@ def _needed_lift(
 ) -> float:
     """Height in m of the bump that keeps the sole clear of the floor at mid-swing."""
     walker = stance.walker
-    wanted = walker.sides[stance.side].clearance_m * np.minimum(1.0, 3.0 * hump)
-    need = wanted - stance.sole.lowest(ankle, q, pitch)
+    clearance = walker.sides[stance.side].clearance_m * np.minimum(1.0, 3.0 * hump)
+    need = clearance - stance.sole.lowest(ankle, q, pitch)
     middle = (u > 0.25) & (u < 0.85)
     most = MOST_LIFT * (walker.anatomy.thigh + walker.anatomy.shank)
     return float(np.clip(np.max(need / np.maximum(hump, 0.25), where=middle, initial=0.0), 0.0, most))

@@ -43,10 +43,10 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
     gait = walker.sides[side]
     prints = plan.footprints[side]
     rows = []
-    for before, landing in pairwise(prints):
+    for previous, landing in pairwise(prints):
         step = landing.step_s
-        stride = landing.time_s - before.time_s
-        paused = any(before.time_s <= start < landing.time_s for start, _ in plan.stands)
+        stride = landing.time_s - previous.time_s
+        paused = any(previous.time_s <= start < landing.time_s for start, _ in plan.stands)
         cycle = 2.0 * step if paused else stride
         opposite = landing.start_s
         release = min(opposite + gait.double_support * cycle, landing.time_s - 0.5 * step)
@@ -55,7 +55,7 @@ def foot_timing(plan: Plan, walker: Walker, side: Side) -> FootTiming:
         before_release = RELEASE_PHASE - gait.heel_off + (gait.double_support - SideGait.double_support)
         heel_off = max(
             release - before_release * cycle,
-            before.time_s + (gait.flat_from + 0.02) * cycle,
+            previous.time_s + (gait.flat_from + 0.02) * cycle,
         )
         rows.append(
             (
@@ -98,8 +98,8 @@ def gait_phase(t: Floats, plan: Plan, timing: FootTiming, rate_hz: float) -> Flo
             )
         knots += [(timing.opposite[i], i + 0.5), (timing.release[i], i + RELEASE_PHASE), (contact, i + 1.0)]
     knots.append((knots[-1][0] + 0.6 * plan.typical_step_s, knots[-1][1] + STANDING_PHASE))
-    at, value = np.array(sorted(knots)).T
-    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.025))
+    knots_s, value = np.array(sorted(knots)).T
+    return smooth(np.interp(t, knots_s, value), size_window(plan, rate_hz, 0.025))
 
 
 def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
@@ -109,8 +109,8 @@ def body_phase(t: Floats, plan: Plan, rate_hz: float) -> Floats:
     for step in plan.steps:
         knots += [(step.start_s, phase), (step.time_s, phase + 0.5)]
         phase += 0.5
-    at, value = np.array(knots).T
-    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.04))
+    knots_s, value = np.array(knots).T
+    return smooth(np.interp(t, knots_s, value), size_window(plan, rate_hz, 0.04))
 
 
 def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
@@ -123,5 +123,5 @@ def amplitude(t: Floats, plan: Plan, walker: Walker, rate_hz: float) -> Floats:
         knots.append((step.time_s - 0.5 * step.step_s, a))
         if step.closes:
             knots += [(step.time_s - 0.2 * step.step_s, 0.6 * a), (step.time_s + 0.25, 0.0)]
-    at, value = np.array(sorted(knots)).T
-    return smooth(np.interp(t, at, value), size_window(plan, rate_hz, 0.05))
+    knots_s, value = np.array(sorted(knots)).T
+    return smooth(np.interp(t, knots_s, value), size_window(plan, rate_hz, 0.05))

@@ -307,7 +307,7 @@ def test_a_missing_sensor_is_named(missing: Segment) -> None:
             free_acceleration(calibrated, without),
             still_feet(calibrated),
             BodyModel.from_height(1.75),
-            worn="3I",
+            configuration="3I",
         )
     assert (settings.value.code, settings.value.sensor) == ("sensor_missing", missing)
 

@@ -228,8 +228,8 @@ def test_a_common_turn_of_the_world_turns_the_result() -> None:
     turned = replace(orientations, q={s: multiply(turn, q) for s, q in orientations.q.items()})
     moved = {s: a[:] @ to_matrix(turn).T for s, a in acceleration.items()}
     for segments in ("3I", "2I"):
-        one = l7s_poses(orientations, acceleration, steps, BODY, worn=segments)
-        second = l7s_poses(turned, moved, steps, BODY, worn=segments)
+        one = l7s_poses(orientations, acceleration, steps, BODY, configuration=segments)
+        second = l7s_poses(turned, moved, steps, BODY, configuration=segments)
         for segment in one.p:
             np.testing.assert_allclose(second.p[segment], one.p[segment] @ to_matrix(turn).T, atol=1e-6)
 
