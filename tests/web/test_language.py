@@ -101,9 +101,9 @@ def test_no_message_of_the_sources_is_guessed(language: str, monkeypatch: pytest
     assert len(reference) > 200
     for template in reference:
         message = Message(template, **dict.fromkeys(PLACEHOLDER.findall(template), 7))
-        text = catalogue.translate(message)
+        text = catalogue.find(message)
+        assert text is not None
         assert not PLACEHOLDER.search(text)
-        assert text != message or template == "{segment}: {error}"
     assert guessed == []
 
 

@@ -22,7 +22,7 @@ from sagittal.core.events.edits import Edit, EditKind
 from sagittal.core.events.result import EventKind, GaitEvent, GaitEvents, Stride, StrideFlag, Strides
 from sagittal.core.events.strides import NOTICES
 from sagittal.core.frames import SEGMENTS, Segment, Side
-from sagittal.core.message import Message
+from sagittal.core.message import Message, join_messages
 from sagittal.core.parameters.catalogue import CATALOGUE
 from sagittal.core.parameters.catalogue.entry import FUNCTIONAL
 from sagittal.core.parameters.measure import MeasuredGait
@@ -162,7 +162,7 @@ def join_faults(notices: Sequence[Notice]) -> tuple[Notice, ...]:
             continue
         cause = causes.get(n.sensor) if n.code == "sensor_failed" else None
         if cause is not None:
-            n = replace(n, message=f"{cause.message} {n.message}", t_s=cause.t_s)
+            n = replace(n, message=join_messages(cause.message, n.message), t_s=cause.t_s)
         joined.append(n)
     return tuple(joined)
 
