@@ -269,7 +269,7 @@ def test_messages_are_found_in_scripts() -> None:
         ("left longer by 0.04 s", "links länger um 0,04 s"),
         ("left shorter by 4.8 points", "links kürzer um 4,8 Punkte"),
         (
-            "against the other side and people at this speed",
+            "vs the other side and people at this speed",
             "gegen die andere Seite und Menschen in diesem Tempo",
         ),
         (

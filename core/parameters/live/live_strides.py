@@ -119,16 +119,21 @@ class LiveStrides:
         """The stride ended by this contact, if its start is within reach; `number`: of one reported
         before.
         """
-        own = [e.time_s for e in self._events if e.side == event.side and e.kind == "ic"]
+        # contacts by way may be reported in arrears, after later ones by pitch
+        earlier = [e for e in self._events if e.time_s <= event.time_s or e.side != event.side]
+        own = sorted(e.time_s for e in earlier if e.side == event.side and e.kind == "ic")
         if len(own) < 2 or own[-2] == own[-1]:  # two contacts may be refined to the same moment
             return []
         first, past = self._sample(own[-2]) - 1, at + 1
         if not history.reaches(first, past):
             return []
         span = self._span(first, past, history, event.side)
-        inside = tuple(e for e in self._events if e.time_s >= own[-2] or e.side != event.side)
+        inside = tuple(e for e in earlier if e.time_s >= own[-2] or e.side != event.side)
         feet = self._turned_feet(max(0, first - self._near), past, history)
-        stride = side_strides(event.side, GaitEvents(inside), feet, None, self._params)[-1]
+        strides = side_strides(event.side, GaitEvents(inside), feet, None, self._params)
+        if not strides:
+            return []
+        stride = strides[-1]
         recent = self._recent[event.side]
         if recent and recent[-1].end_s != stride.start_s:
             recent.clear()

@@ -65,7 +65,7 @@ def view_programme(programme: Programme, today: dt.date) -> dict[str, Any]:
     visits = len(programme.visits)
     parts = [
         Message(
-            f"{{count}} of {{visits}} {plural(visits, 'visit', 'visits')} done",
+            f"{{count}} of {{visits}} {plural(visits, 'visit', 'visits')} completed",
             count=programme.count("done"),
             visits=visits,
         )
@@ -92,7 +92,7 @@ def _week(programme: Programme, week: int, *, now: bool) -> dict[str, Any]:
     done = sum(v.state == "done" for v in trainings)
     missing = sum(v.state == "missing" for v in trainings)
     text: str = Message(
-        f"{{done}} of {{trainings}} {plural(len(trainings), 'training', 'trainings')} done",
+        f"{{done}} of {{trainings}} {plural(len(trainings), 'training', 'trainings')} completed",
         done=done,
         trainings=len(trainings),
     )

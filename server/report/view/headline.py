@@ -180,14 +180,14 @@ def say_badge(kind: str, strides: Strides) -> str:
     left, right = (len(strides.select_used(side)) for side in SIDES)
     count = left + right
     count_text = Message(
-        f"{{count}} {plural(count, 'stride', 'strides')} used, {{left}} left and {{right}} right",
+        f"{{count}} {plural(count, 'stride', 'strides')} included, {{left}} left and {{right}} right",
         count=count,
         left=left,
         right=right,
     )
     if min(left, right) < COMPARED and strides.strides:
         return Message(
-            "{count_text}: at least {COMPARED} strides per side are needed for a comparison.",
+            "{count_text}: at least {COMPARED} per side are needed for a comparison.",
             count_text=count_text,
             COMPARED=COMPARED,
         )

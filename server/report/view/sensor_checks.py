@@ -116,4 +116,4 @@ def _place(s: Mapping[str, Any]) -> tuple[str, str]:
     if (duration_s := s.get("place_judged_s")) is None:
         return Message("Placement {NOT_JUDGED}", NOT_JUDGED=NOT_JUDGED), ""
     start, end = (format_number(x) for x in duration_s)
-    return Message("Stayed from {start} to {end}\u202fs", start=start, end=end), "ok"
+    return Message("Stable from {start} to {end}\u202fs", start=start, end=end), "ok"

@@ -36,13 +36,13 @@ def test_a_lag_is_said_in_milliseconds_with_its_direction() -> None:
 def test_what_was_done_about_a_lag_is_said() -> None:
     text = tell_lag(LATE, LagParams())
     assert (text.code, text.sensor, text.severity) == ("sensor_late", "shank_r", "warning")
-    assert "its samples were shifted by that. Synchronise" in text.message
+    assert "its samples were shifted accordingly. Synchronise" in text.message
     little = tell_lag(replace(LATE, lag_s=-0.025), LagParams(warn_s=0.025))
     assert little.severity == "info"
     assert "Synchronise" not in little.message
     assert tell_lag(replace(LATE, lag_s=-0.0251), LagParams(warn_s=0.025)).severity == "warning"
     left = tell_lag(LATE, LagParams(repair=False))
-    assert "It was left so" in left.message
+    assert "It was not corrected" in left.message
     unsure = tell_lag(replace(LATE, sure=False), LagParams())
     assert unsure.code == "clocks_disagree"
     assert "nothing was shifted" in unsure.message
@@ -56,7 +56,7 @@ def test_a_drift_has_a_direction(change_s: float, which: str) -> None:
     assert text.message.startswith(
         f"The clock of foot_l runs {which}, by 30 ± 4 ms over the walk; its samples"
     )
-    assert "it was left so" in tell_drift(drift, LagParams(repair=False)).message
+    assert "it was not corrected" in tell_drift(drift, LagParams(repair=False)).message
 
 
 def test_an_exchange_names_its_pairs() -> None:
@@ -66,7 +66,7 @@ def test_an_exchange_names_its_pairs() -> None:
     )
     text = tell_exchange(sensor_exchange, ExchangeParams())
     assert (text.code, text.sensor) == ("sensors_exchanged", "thigh_l")
-    assert "the right way round" in text.message
+    assert "with the corrected assignment" in text.message
     assert "Nothing was changed" in tell_exchange(sensor_exchange, ExchangeParams(repair=False)).message
 
 
@@ -79,17 +79,17 @@ def test_a_slip_is_said_in_degrees_with_its_moment() -> None:
 def test_what_follows_from_a_slip_is_said() -> None:
     shank = tell_slip(replace(SLIP, segment="shank_l"), SlipParams())
     assert (shank.code, shank.sensor, shank.t_s) == ("sensor_slipped", "shank_l", 17.2)
-    assert "within 2 s of that; what came after was turned back" in shank.message
-    assert "From 15 s on it is left out" in tell_slip(SLIP, SlipParams()).message
+    assert "within 2 s of the slip are excluded; later samples were corrected" in shank.message
+    assert "From 15 s on it is excluded" in tell_slip(SLIP, SlipParams()).message
     assert "From 0 s on" in tell_slip(replace(SLIP, at_s=1.0), SlipParams()).message
-    assert "It is left out, as if" in tell_slip(replace(SLIP, at_rest=True), SlipParams()).message
-    assert "It was left so" in tell_slip(SLIP, SlipParams(repair=False)).message
+    assert "It is excluded as if" in tell_slip(replace(SLIP, at_rest=True), SlipParams()).message
+    assert "It was not corrected" in tell_slip(SLIP, SlipParams(repair=False)).message
 
 
 def test_what_is_left_after_the_repair_is_doubtful() -> None:
     text = tell_left_over(replace(LATE, lag_s=-0.0404))
     assert (text.code, text.sensor) == ("clocks_disagree", "shank_r")
-    assert "After the repair shank_r and foot_r still seems 40 ms off" in text.message
+    assert "After correction shank_r and foot_r still appears 40 ms out of sync" in text.message
 
 
 def test_sensors_are_listed_as_in_a_sentence() -> None:

@@ -56,7 +56,7 @@ def test_an_exchange_and_a_slip_ask_for_another_calibration() -> None:
     ("code", "says"),
     [
         ("sensors_exchanged", "The sensors of foot_l and foot_r fit where they are worn now."),
-        ("sensor_slipped", "The sensor on foot_l and foot_r sits as it did before it slipped."),
+        ("sensor_slipped", "The sensor on foot_l and foot_r is back in its position from before the slip."),
         ("sensor_late", "The clock of foot_l and foot_r agrees with the others now."),
         ("clocks_disagree", "The clock of foot_l and foot_r agrees with the others now."),
     ],

@@ -180,7 +180,7 @@ def test_another_estimator_runs_on_the_same_take() -> None:
 
 
 def test_an_estimator_that_lacks_its_sensors_says_which_it_needs() -> None:
-    with pytest.raises(EstimationError, match="needs sensors on the pelvis and both feet") as caught:
+    with pytest.raises(EstimationError, match="requires sensors on the pelvis and both feet") as caught:
         estimated(only(simulated("fast_with_turns", 3)[0], *FEET), PoseParams(estimator="l7s_3i"))
     assert caught.value.code == "estimator_impossible"
 

@@ -42,7 +42,7 @@ def test_shuffling_feet_are_reported_with_the_measured_pitch() -> None:
     (left, right) = found.notices
     assert left.code == right.code == "no_toe_off"
     lowest = 0.15 * np.degrees(cycle_pitch(FINE).min())
-    assert f"never pitched below −11.5° (lowest was −{-lowest:.1f}°)" in left.message
+    assert f"never fell below −11.5° (lowest: −{-lowest:.1f}°)" in left.message
 
 
 def test_a_foot_that_is_not_level_at_rest_is_suspected() -> None:
@@ -53,7 +53,7 @@ def test_a_foot_that_is_not_level_at_rest_is_suspected() -> None:
     assert "8.0°" in notice.message
     assert notice.sensor == "foot_l"
     low = orientations(100.0, {"foot_l": foot_pitch(t, 2.0, 8, 1.1) - np.radians(40.0)})
-    assert "never pitched above 5.7°" in next(
+    assert "never exceeded 5.7°" in next(
         n.message for n in detect(low).notices if n.code == "rest_pose_suspect"
     )
 

@@ -86,7 +86,7 @@ def test_a_walk_of_three_metres_counts_nothing_and_says_why() -> None:
     found = stride_list(straight(3), standing())
     assert not found.select_used()
     assert [n.code for n in found.notices] == ["no_strides", "no_strides"]
-    assert found.notices[0].message.startswith("None of the 2 left strides counts: 1 first, 1 last.")
+    assert found.notices[0].message.startswith("All 2 left strides are excluded: 1 first, 1 last.")
     assert "walk further" in found.notices[0].message
 
 
@@ -181,7 +181,7 @@ def test_a_foot_of_which_nothing_counts_is_named() -> None:
     t = np.arange(3000) / RATE
     found = stride_list(straight(), standing(heading=t * 0.9))
     assert {n.code for n in found.notices} == {"no_strides"}
-    assert any(n.message.startswith("None of the 8 left strides counts: 8 turn.") for n in found.notices)
+    assert any(n.message.startswith("All 8 left strides are excluded: 8 turn.") for n in found.notices)
 
 
 @pytest.mark.parametrize("contacts", [[], [1.0]])

@@ -53,7 +53,7 @@ def test_every_rule_names_its_source_and_says_whether_it_was_read() -> None:
     assert len({r.name for r in RULES}) == len(RULES)
     for rule in RULES:
         assert rule.source
-        assert rule.verified or "not confirmed" in rule.source or "no source confirmed" in rule.source
+        assert rule.verified or "not confirmed" in rule.source or "no confirmed source" in rule.source
     unread = {r.name for r in RULES if not r.verified}
     assert unread == {
         "knee_hyperextension", "low_dorsiflexion_swing", "flat_contact", "step_length_asymmetry",

@@ -175,7 +175,7 @@ def test_the_trunk_needs_a_sensor_and_a_rest() -> None:
         valid=cut.valid[walk],
         interpolated=cut.interpolated[walk],
     )
-    with pytest.raises(EstimationError, match="never rests"):
+    with pytest.raises(EstimationError, match="never still"):
         follow_trunk(replace(take, t_s=take.t_s[:300], sensors={"pelvis": part}))
 
 

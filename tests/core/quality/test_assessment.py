@@ -53,7 +53,7 @@ def test_a_sound_take_is_good() -> None:
         (ACC - [0.0, 9.81, 0.0], GYR, "gravity_removed", "FreeAcc"),
         (ACC[600:], np.degrees(GYR[600:]), "unit_suspect", "deg/s"),
         (ACC[600:] / GRAVITY, GYR[600:], "unit_suspect", "g read as m/s²"),
-        ((ACC - [0.0, 9.81, 0.0])[600:], GYR[600:], "gravity_removed", "middle"),
+        ((ACC - [0.0, 9.81, 0.0])[600:], GYR[600:], "gravity_removed", "mid-trial"),
     ],
 )
 def test_signals_that_would_give_wrong_numbers_are_errors(
@@ -141,7 +141,7 @@ def test_the_end_that_a_late_clock_leaves_empty_is_told_from_a_tenth_of_a_second
     report = assess(recording, replace(uniform, sensors={"foot_l": late}))
     messages = [n.message for n in report.notices if n.code == "gap"]
     assert len(messages) == told
-    assert all("1 stretch of 0.1 s and more" in m and f"{lost_s:.2f} s" in m for m in messages)
+    assert all("1 gap of at least 0.1 s" in m and f"{lost_s:.2f} s" in m for m in messages)
 
 
 def test_errors_of_the_reader_stop_the_analysis_only_for_worn_sensors() -> None:

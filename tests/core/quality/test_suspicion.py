@@ -65,10 +65,10 @@ def test_the_force_at_rest_is_gravity(norm: float, expected: list[tuple[str, str
         (0.71, 0.9, 0.3, [UNIT], "looks like g"),
         (1.49, 0.9, 0.3, [UNIT], "looks like g"),
         # what is left without gravity may happen to be of that size
-        (0.69, 0.9, 0.3, [REMOVED], "middle"),
-        (1.51, 0.9, 0.3, [REMOVED], "middle"),
-        (1.0, 0.4, 0.3, [REMOVED], "middle"),
-        (1.0, 0.9, 1.6, [REMOVED], "middle"),
+        (0.69, 0.9, 0.3, [REMOVED], "mid-trial"),
+        (1.51, 0.9, 0.3, [REMOVED], "mid-trial"),
+        (1.0, 0.4, 0.3, [REMOVED], "mid-trial"),
+        (1.0, 0.9, 1.6, [REMOVED], "mid-trial"),
     ],
 )
 def test_without_rest_the_middle_of_the_take_is_near_gravity(

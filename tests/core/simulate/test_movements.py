@@ -32,7 +32,7 @@ def test_every_patient_has_a_timed_up_and_go() -> None:
 def test_titles_say_how_the_sensors_of_squats_sit() -> None:
     for movement in MOVEMENTS.values():
         if isinstance(movement.does, Squats):
-            assert ("placed according to protocol" in movement.title) is movement.agreed
+            assert ("put on as agreed" in movement.title) is movement.agreed
             assert ("put on anyhow" in movement.title) is not movement.agreed
         else:
             assert not movement.agreed

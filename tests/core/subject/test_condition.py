@@ -86,13 +86,13 @@ def test_belts_of_another_speed_are_another_condition(
 @pytest.mark.parametrize(
     ("condition", "words"),
     [
-        (USUAL, "own pace, no aid, shoes"),
+        (USUAL, "comfortable pace, no aid, shoes"),
         (replace(USUAL, pace="fast", orthosis="ankle_foot"), "fast, no aid, ankle-foot orthosis, shoes"),
-        (replace(USUAL, aid=None, feedback=True), "own pace, aid not stated, shoes, with feedback"),
+        (replace(USUAL, aid=None, feedback=True), "comfortable pace, aid not stated, shoes, with feedback"),
         (WalkingCondition(feedback=True), "condition not stated, with feedback"),
         (
             replace(USUAL, protocol="treadmill", belt_speed_mps=0.83),
-            "treadmill at 0.83\u202fm/s, own pace, no aid, shoes",
+            "treadmill at 0.83\u202fm/s, comfortable pace, no aid, shoes",
         ),
     ],
 )
@@ -102,7 +102,7 @@ def test_a_condition_is_said_in_words(condition: WalkingCondition, words: str) -
 
 def test_differences_name_both_conditions_in_their_order() -> None:
     fast = replace(USUAL, pace="fast", aid="stick")
-    assert compare_conditions(USUAL, fast) == ("own pace, then fast", "no aid, then stick")
+    assert compare_conditions(USUAL, fast) == ("comfortable pace, then fast", "no aid, then stick")
 
 
 def test_only_unaided_walks_serve_others_as_reference() -> None:

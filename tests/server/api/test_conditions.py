@@ -89,11 +89,11 @@ async def test_a_trend_follows_one_condition_and_offers_the_others(clinic: Clini
     fast = feedback.walked(clinic, patient, 10, **FAST)
     silent = feedback.walked(clinic, patient, 11)
     path = f"{API}/patients/{patient}/trends"
-    # what nobody stated is a condition of its own; the newest visit at own pace is followed, stated or not
+    # what nobody stated is a condition of its own; the newest visit at comfortable pace is followed
     assert [v["session_id"] for v in (await _get(clinic, path))["visits"]] == [silent]
     own = await _get(clinic, f"{path}?like={first}")
     assert [v["session_id"] for v in own["visits"]] == [first, later]
-    assert own["condition"]["words"] == "own pace, no aid, shoes"
+    assert own["condition"]["words"] == "comfortable pace, no aid, shoes"
     offered = [(o["condition"]["words"], o["count"], o["session_id"]) for o in own["others"]]
     assert offered == [("condition not stated", 1, silent), ("fast, no aid, shoes", 1, fast)]
     page = await _get(clinic, f"/patients/{patient}/trends?like={first}")
@@ -122,7 +122,7 @@ async def test_unlike_walks_side_by_side_say_so_and_claim_no_change(clinic: Clin
     alike = feedback.walked(clinic, patient, 8, 12.0, **OWN)
     value = await _get(clinic, f"{API}/sessions/{fast}/compare/{own}")
     assert value["comparable"] is False
-    assert "own pace, then fast" in value["cautions"][0]
+    assert "comfortable pace, then fast" in value["cautions"][0]
     assert [c["condition"]["pace"] for c in (value["before"], value["after"])] == ["comfortable", "fast"]
     there = [c for c in value["changes"] if c["difference"] is not None]
     assert there
@@ -246,7 +246,7 @@ async def test_the_pages_ask_for_the_condition_and_say_it(clinic: Clinic) -> Non
         assert "fast, no aid, shoes" in text
         assert f'data-api="PATCH /api/v1/sessions/{session}"' in text
     done = feedback.walked(clinic, patient, 1, **{**OWN, "orthosis": "ankle_foot"})
-    words = "own pace, no aid, ankle-foot orthosis, shoes"
+    words = "comfortable pace, no aid, ankle-foot orthosis, shoes"
     for page in (f"/sessions/{done}/print", f"/patients/{patient}", f"/sessions/{done}"):
         assert words in await _get(clinic, page)
     assert (await _get(clinic, f"{API}/sessions/{done}/report"))["condition"] == words
@@ -295,4 +295,4 @@ async def test_paper_has_the_sentences_that_its_numbers_refer_to_the_changes_and
     )
     assert marked <= notices
     assert f"/compare/{first}" not in paper
-    assert re.search(r"\d+ within error, \d+ not judged", sentences)
+    assert re.search(r"\d+ within measurement error, \d+ without a known measurement error", sentences)

@@ -389,7 +389,7 @@ async def test_an_emergency_opens_a_patient_for_a_time_and_everybody_concerned_s
     async with guarded.clinic.client("admin") as client:
         assert "Dr Elm" in (await client.get(f"/patients/{guarded.one['pid']}")).text
         log = (await client.get("/audit")).text
-        assert "opened the patient in an emergency" in log
+        assert "opened the patient with emergency access" in log
         assert "Dr Elm" in log
         rows = (await client.get("/api/v1/audit")).text
         assert "emergency.refused" in rows

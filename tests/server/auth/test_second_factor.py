@@ -61,7 +61,7 @@ async def test_signing_in_needs_a_code_that_works_once(clinic: Clinic, clock: At
     async with clinic.client("clinician") as client:
         totp, codes = await enrol(clinic, client, clock)
         assert len(set(codes)) == 10
-        assert "A code is asked for" in (await client.get("/account")).text
+        assert "A code is required" in (await client.get("/account")).text
         # no second one over it
         second_response = await client.post(f"{API}/account/second-factor", json={"password": PASSWORD})
         assert second_response.status_code == 409

@@ -22,7 +22,7 @@ def test_consent_is_given_withdrawn_given_anew_and_erased_with_the_patient(tmp_p
     with clinic.db.write() as c:
         first = consents.give(c, None, pid, purpose="research", evidence=" form 12 ", given_on=long_ago)
         assert (first.given_on, first.evidence, first.withdrawn_on) == (long_ago, "form 12", None)
-        with pytest.raises(Conflict, match="holds"):
+        with pytest.raises(Conflict, match="in force"):
             consents.give(c, None, pid, purpose="research", evidence="form 13")
         consents.give(c, None, pid, purpose="teaching", evidence="by e-mail")
         assert consents.withdraw(c, None, first.id).withdrawn_on == now().date()

@@ -185,4 +185,4 @@ def test_a_check_that_is_not_measured_is_told_with_its_reason() -> None:
     for checks, word in (([none], "Not measured"), ([check(LEFT), none], "First check")):
         verdict = judge_device(follow_device(checks), checks, days[: len(checks)])
         assert verdict.word == word
-        assert "never at rest" in " ".join(verdict.reasons)
+        assert "never still" in " ".join(verdict.reasons)

@@ -156,16 +156,16 @@ def test_a_missing_or_other_key_is_an_error_and_never_a_new_key(names: Names, tm
     names.keep()
     stored_content = names.file.read_bytes()
     names.file.unlink()
-    with pytest.raises(KeyUnusable, match="not in its place"):
+    with pytest.raises(KeyUnusable, match="patient names is missing"):
         names.get(names.one)
-    with names.db.write() as c, pytest.raises(KeyUnusable, match="not in its place"):
+    with names.db.write() as c, pytest.raises(KeyUnusable, match="patient names is missing"):
         identities.change(c, names.file, None, names.one, {"name": "X"})
     with pytest.raises(KeyUnusable, match="which is not at"):
         identities.make_key(names.db, names.file)
     assert not names.file.exists()
-    assert "not in its place" in names.problems()[0]
+    assert "patient names is missing" in names.problems()[0]
     make_keys(names.file)
-    with pytest.raises(KeyUnusable, match="the key file of this computer holds"):
+    with pytest.raises(KeyUnusable, match="the key file on this computer holds"):
         names.get(names.one)
     assert len(names.problems()) == 1
     for content in (b"", b"SAGITTAL-FIELD-KEY-1 12\n", b"\xff\xfe"):
@@ -269,7 +269,7 @@ def test_one_key_seals_whatever_file_a_computer_has(names: Names, tmp_path: Path
     with names.db.read() as c:
         assert identities.are_kept(c, second)
     make_keys(second)
-    with names.db.write() as c, pytest.raises(KeyUnusable, match="the key file of this computer holds") as no:
+    with names.db.write() as c, pytest.raises(KeyUnusable, match="the key file on this computer holds") as no:
         identities.change(c, second, None, names.one, {"name": "X"})
     assert no.value.code == "identity_key_wrong"
     with pytest.raises(KeyUnusable):
@@ -322,7 +322,7 @@ def test_the_command_makes_changes_and_discards(
     tell_commands(monkeypatch, Settings(data_dir=tmp_path, database_url=choose_url(tmp_path)))
     home = ["--data", str(tmp_path)]
     assert main(["identity-key", "change", *home]) == 1
-    assert "keeps no names" in capsys.readouterr().err
+    assert "does not store names" in capsys.readouterr().err
     assert main(["identity-key", "make", *home]) == 0
     assert "keep a copy on" in capsys.readouterr().out
     assert main(["identity-key", "make", *home]) == 1

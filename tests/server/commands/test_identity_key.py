@@ -40,7 +40,7 @@ def test_a_changed_key_opens_the_names_that_the_old_one_opened(
     clinic: Clinic, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert ask(clinic, "change") == 1
-    assert "keeps no names" in capsys.readouterr().err
+    assert "does not store names" in capsys.readouterr().err
     ask(clinic, "make")
     keep_name(clinic)
     capsys.readouterr()

@@ -86,7 +86,7 @@ def test_persons_and_visits_stand_in_the_tables_by_pseudonyms_and_days_from_the_
     assert rows[0]["height_m"] == "1.75"
     assert rows[0]["edits"] == "0"
     assert study.failed == 1
-    assert b"Analyse it, or leave it out." in study.files[FAILURES]
+    assert b"Analyse or exclude it." in study.files[FAILURES]
     text = b"".join(study.files.values())
     for secret in (b"Jane", course.jane.encode(), course.walked[0].encode(), b"walk.txt", b"2026-03"):
         assert secret not in text, secret

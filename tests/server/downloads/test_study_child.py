@@ -56,7 +56,7 @@ def test_the_tables_come_as_a_zip_with_the_visits_in_them(stored: Clinic, ask: A
 def test_a_choice_of_nothing_is_refused_with_its_own_code(ask: Ask) -> None:
     reply = ask(order(StudyChoice(visits=frozenset())))
     assert (reply.code, reply.content, reply.visits) == ("no_visits", b"", ())
-    assert reply.message.startswith("No visit fits this choice.")
+    assert reply.message.startswith("No visit matches.")
 
 
 def test_what_goes_wrong_otherwise_is_in_the_log_and_not_in_the_answer(

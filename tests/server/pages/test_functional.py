@@ -69,7 +69,7 @@ async def test_the_card_has_total_segments_norm_and_no_last_visit_at_first(
     assert card.count("<rect") == 5
     assert "slower than average above 10.2 s" in card
     assert "Bohannon 2006" in card
-    assert "Visit before" not in card
+    assert "Previous visit" not in card
     assert "measured by the sensor: pelvis" in card
 
 
@@ -88,7 +88,7 @@ async def test_the_second_visit_stands_beside_the_first_and_tells_the_hand(
 ) -> None:
     html = await page(clinic, f"/sessions/{visits[1]}")
     card = card_of(html)
-    initial = card[card.index("Visit before") :]
+    initial = card[card.index("Previous visit") :]
     assert re.search(r'class="v">2[01]\.\d<', initial)
     assert "start and end confirmed or set manually" in card
     assert "No strides" not in html

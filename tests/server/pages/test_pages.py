@@ -176,7 +176,7 @@ async def test_the_numbers_after_an_edit_are_no_page_of_their_own(clinic: Clinic
 async def test_every_page_assumes_the_same_height(clinic: Clinic) -> None:
     async with clinic.client("admin") as client:
         patient = (await client.post("/api/v1/patients", json={"code": "Q-HEIGHT"})).json()["id"]
-    words = f"without it {NOMINAL_HEIGHT_M:.2f} m is assumed"
+    words = f"{NOMINAL_HEIGHT_M:.2f} m is assumed"
     assert words in (await page(clinic, f"/patients/{patient}/sessions/new")).lower()
     templates = ROOT / "web" / "templates"
     by_name = {p.name: re.findall(r"\d\.\d\d m\b", p.read_text()) for p in templates.glob("*.html")}

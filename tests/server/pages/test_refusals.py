@@ -72,6 +72,6 @@ async def test_an_address_cut_short_has_nothing_and_says_so(tmp_path: Path) -> N
         page = await client.get("/sessions/0123abc", headers={"accept": "text/html"})
         program = await client.get("/api/v1/sessions/0123abc")
     assert page.status_code == 404
-    assert "There is nothing at this address" in page.text
+    assert "Nothing exists at this address" in page.text
     assert "pattern" not in page.text
     assert program.json()["code"] == "invalid_request"

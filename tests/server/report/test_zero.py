@@ -77,7 +77,7 @@ def test_the_figure_at_contact_is_where_its_curve_begins(bundle: Bundle) -> None
         assert curve[0] == pytest.approx(cell.value)
     assert hip.title == "Hip flexion, anatomical"
     assert row.title == "Hip flexion at contact, anatomical"
-    assert rows["hip_flexion_ic_deg"].title == "Hip flexion at contact, from standing"
+    assert rows["hip_flexion_ic_deg"].title == "Hip flexion at contact, relative to standing"
     assert rows["hip_flexion_rom_deg"].title == "Hip flexion range"
 
 
@@ -100,9 +100,9 @@ def test_no_title_and_no_name_occurs_twice_in_a_report(bundle: Bundle, standing:
 
 def test_why_there_is_no_band_is_said_once(bundle: Bundle) -> None:
     notes = " ".join(report_model(bundle, age=40).curve_notes)
-    assert notes.count("no norm band: these curves start from this person's standing") == 1
+    assert notes.count("no norm band: these curves are relative to this person's standing") == 1
     partly = " ".join(measured(bundle, STANDING).curve_notes)
-    assert "Curves named anatomical start from what the goniometer read" in partly
+    assert "Curves from neutral use the goniometer angles" in partly
     assert "no norm band" in partly
 
 
@@ -123,7 +123,7 @@ def test_own_controls_from_standing_give_curves_from_standing_their_band(bundle:
 def test_an_estimated_angle_stays_from_standing_without_a_band(make_bundle: MakeBundle) -> None:
     bundle = make_bundle(estimator=section(estimated_angles=["knee_flexion_l", "knee_flexion_r"]))
     knee = panel(measured(bundle, STANDING), "knee_flexion")
-    assert (knee.zero, knee.norm, knee.title) == ("standing", None, "Knee flexion, from standing")
+    assert (knee.zero, knee.norm, knee.title) == ("standing", None, "Knee flexion, relative to standing")
 
 
 def test_two_visits_are_drawn_from_one_zero(bundle: Bundle) -> None:

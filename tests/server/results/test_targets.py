@@ -48,7 +48,7 @@ def test_a_target_that_is_entered_and_a_person_without_a_walk_are_offered_nothin
     missing = offer(None, "norm", NAME, "left")
     assert missing.target is None
     assert missing.reason is not None
-    assert missing.reason.startswith("No walk of this person without feedback is analysed yet.")
+    assert missing.reason.startswith("No walk without feedback has been analysed for this person yet.")
 
 
 def test_a_persons_own_side_is_a_target_with_its_strides_and_day() -> None:
@@ -85,7 +85,7 @@ def test_the_better_side_is_the_other_one_where_it_is_ahead() -> None:
 def test_neither_side_is_better_of_both_or_of_a_parameter_without_a_direction() -> None:
     pair = offer(walk(step("left", 0.5)), "own_better_side", NAME, None)
     assert pair.reason is not None
-    assert pair.reason.startswith("Both sides are trained.")
+    assert pair.reason.startswith("Both sides are selected for training.")
     open_end = offer(walk(), "own_better_side", "knee_flexion_ic_deg", "left")
     assert open_end.reason is not None
     assert "neither higher nor lower is better by itself" in open_end.reason

@@ -347,7 +347,7 @@ def test_a_key_opens_only_its_own_and_a_public_one_only_encrypts(clinic: Clinic,
     (tmp_path / "public.key").write_text(f"# of the clinic\n{public}\n")
     (tmp_path / "none.key").write_text("hunter2\n")
     assert (tmp_path / "clinic.key").stat().st_mode & 0o077 == 0
-    with pytest.raises(BackupFileError, match="never written over"):
+    with pytest.raises(BackupFileError, match="never overwritten"):
         make_key(tmp_path / "clinic.key")
     with pytest.raises(BackupFileError, match="holds no key"):
         read_key(tmp_path / "none.key")

@@ -194,7 +194,7 @@ def test_a_foot_that_faces_backwards_after_calibration_is_refused(estimator: Est
             BodyModel.from_height(1.75),
         )
     assert (error.value.code, error.value.sensor) == ("headings_apart", "foot_r")
-    assert re.search(r"faces 1[78]\d° away", error.value.message)
+    assert re.search(r"points 1[78]\d° away", error.value.message)
 
 
 @pytest.mark.sweep

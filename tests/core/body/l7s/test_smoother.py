@@ -124,7 +124,7 @@ def test_a_pass_is_that_of_gauss_newton_on_what_is_made_small(monkeypatch: pytes
 
 def test_places_that_are_no_numbers_are_refused() -> None:
     source = Problem.make(9)
-    with pytest.raises(EstimationError, match="cannot be found"):
+    with pytest.raises(EstimationError, match="cannot be determined"):
         replace(source, R=np.full_like(source.R, np.nan)).solve()
 
 

@@ -87,10 +87,10 @@ async def test_a_prescription_is_ended_once(clinic: Clinic) -> None:
     [
         ({"parameter": "beauty"}, "Expected one of gait_speed_mps"),
         ({"target": {"source": "manual"}}, "Expected both numbers"),
-        ({"target": {"source": "norm"}}, "No walk of this person without feedback is analysed yet"),
+        ({"target": {"source": "norm"}}, "No walk without feedback has been analysed for this person yet"),
         ({"schedule": {"shares_pct": [0, 100]}}, "Expected no share above the one before"),
         ({"schedule": {"speed": 1}}, "schedule.speed"),
-        ({"parameter": "stride_length_m"}, "is the same for both sides of a walk"),
+        ({"parameter": "stride_length_m"}, "is common to both sides of a walk"),
         ({"target": {"source": "manual", "mean": 1000.0, "sd": 2.0}}, "Expected 0 to 110"),
         ({"target": {"source": "manual", "mean": 62.0, "sd": 1000.0}}, "Expected at most 110"),
         ({"band_sd": 0}, "band_sd is 0.0. Expected a number from 0.1 to 5"),
@@ -129,7 +129,7 @@ async def test_targets_are_the_persons_own_numbers_or_a_norm_at_their_speed(clin
     assert [offers["own_baseline"][k] for k in ("mean", "sd")] == [left.mean, left.sd]
     assert offers["own_baseline"]["words"] == f"left side, {left.n} strides on 2 Mar 2026"
     assert "Enter mean and SD" in offers["manual"]["reason"]
-    assert "Choose the one that is" in pair["own_better_side"]["reason"]
+    assert "Choose one side; the other is then the target" in pair["own_better_side"]["reason"]
     norm = next(o for o in stance if o["source"] == "norm")
     assert 55.0 < norm["mean"] < 68.0, "contacts are those of a walkway"
     assert unknown.status_code == 422

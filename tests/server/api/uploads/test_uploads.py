@@ -115,7 +115,7 @@ async def test_a_cut_connection_leaves_what_came_and_it_is_found_again(clinic: C
         body = second_response.json()["offset"]
         assert 2_000_000 <= body < len(content)
         page = await client.get(f"/sessions/{session}/upload")
-        assert "Choose the file again to go on" in page.text
+        assert "Choose the file again to continue" in page.text
         assert (await send(client, path, body, content[body:])).json()["offset"] == len(content)
         assert (await finish(client, path, content)).status_code == 200
     assert not part.exists()

@@ -46,9 +46,9 @@ def test_weeks_are_counted_without_a_week_nought_and_one_of_them_is_now() -> Non
 
 def test_what_was_done_is_missing_and_comes_next_is_said() -> None:
     view = view_programme(PLAN, MONDAY)
-    assert view["summary"] == "2 of 4 visits done, 1 missing, next T3 on 16 Mar 2026"
+    assert view["summary"] == "2 of 4 visits completed, 1 missing, next T3 on 16 Mar 2026"
     initial, first, empty, third = view["weeks"]
-    assert first["words"] == "1 of 2 trainings done, 1 missing"
+    assert first["words"] == "1 of 2 trainings completed, 1 missing"
     assert third["words"] == "0 of 1 training completed"
     assert empty["words"] == "0 of 0 trainings completed"
     assert ([v.label for v in initial["assessments"]], initial["trainings"]) == (["PRE"], [])

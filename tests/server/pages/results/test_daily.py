@@ -114,7 +114,7 @@ async def test_trends_show_the_clinic_beside_home(clinic: Clinic, visits: dict[s
     rows = re.findall(r"<tr>\s*<td.*?</tr>", card, re.DOTALL)
     assert len(rows) == 10
     assert ">clinic<" in rows[0]
-    assert "worn too short" in rows[1]
+    assert "wear time too short" in rows[1]
     cells = re.findall(r'<td class="n">(.*?)</td>', rows[2])
     assert cells == ["–", "3690", "100", "23:00"]
     # the visit in the clinic stays what is followed, though daily life is newer
@@ -129,5 +129,5 @@ async def test_trends_of_daily_life_alone_say_that_capacity_is_unknown(clinic: C
     analysed.finish(clinic, patient, body["id"], daily.files(daily.live(2.0)))
     html = await page(clinic, f"/patients/{patient}/trends")
     card = cut_card(html, "h-daily")
-    assert "capacity is not known" in card
+    assert "capacity is unknown" in card
     assert "Steps per day" in html

@@ -142,7 +142,7 @@ def test_strip_shows_every_stride_and_crosses_the_ones_left_out(bundle: Bundle) 
     root = fromstring(strip_svg(bundle.strides, 12.0))
     marks = list(root.iter("g"))
     assert len(marks) == len(bundle.strides.strides)
-    out = [e for e in marks if "left out: first of a walk" in (e.findtext("title") or "")]
+    out = [e for e in marks if "excluded: first of a walk" in (e.findtext("title") or "")]
     assert len(out) == 2
     assert all(all_of(e, "xx") for e in out)
     assert len(all_of(root, "now")) == 1

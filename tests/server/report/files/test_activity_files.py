@@ -62,7 +62,7 @@ def test_without_a_sensor_on_the_trunk_it_is_said_where_one_is_needed(recording:
     source = SourceFile.of_bytes("day.parquet", write_recording(recording))
     (device,) = recording.streams
     manifest = json.dumps({"sensors": {device: "foot_l"}}).encode()
-    with pytest.raises(SignalError, match="chest or the lower back") as error:
+    with pytest.raises(SignalError, match="chest or lower back") as error:
         analysing.run([source], manifest, None, lambda stage, share: None)
     assert error.value.code == "no_trunk_sensor"
 

@@ -20,7 +20,7 @@ def tell(earlier: Parameter | None, later: Parameter) -> LeafletFigure:
 def test_what_was_measured_in_another_way_is_not_set_beside_it() -> None:
     notices = tell(knee(40.0), knee(60.0, estimated=True))
     assert (notices.now, notices.before, notices.estimated) == ("60 degrees", None, True)
-    assert "in another way" in notices.words
+    assert "differently" in notices.words
     assert tell(None, knee(60.0)).words == "There is no earlier value to compare with."
 
 

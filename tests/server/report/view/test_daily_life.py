@@ -118,7 +118,7 @@ def test_unknown_inclination_is_a_reason_not_nought() -> None:
     visible_rows = daily_life_view(blind)
     assert visible_rows is not None
     assert visible_rows.leans == ()
-    assert "which way is forward" in (visible_rows.lean_reason or "")
+    assert "the forward direction" in (visible_rows.lean_reason or "")
     assert 'class="mb"' not in inclination_svg(blind, visible_rows.days[0])
 
 

@@ -58,12 +58,12 @@ def test_a_probe_stands_beside_the_strides_right_before_it() -> None:
 
 def test_notes_say_how_far_the_live_values_were_off_and_what_was_left_out() -> None:
     mode, side_effects, live = view(take([cue(1), cue(2)], [0.60, 0.60])).notes
-    assert mode.startswith("Values are those of the finished analysis")
+    assert mode.startswith("Values are from the completed analysis")
     assert side_effects == "Side effects: the last 20 strides vs the first 10 of the trial."
-    assert live == f"What was fed back differed from the analysis by 0.020 ± 0.000{NBSP}m."
+    assert live == f"Live feedback values differed from the analysis by 0.020 ± 0.000{NBSP}m."
     few = split([AnalysedStride("left", 2.0, 0.6, False)], [cue(1), cue(2), cue(3)])
     assert view(few).notes[2:] == (
-        "2 cues were excluded because they have no stride in the analysis.",
+        "2 cues, excluded, have no stride in the analysis.",
         "1 cue was excluded because its stride is excluded from the analysis.",
     )
 

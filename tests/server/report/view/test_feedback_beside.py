@@ -104,7 +104,7 @@ def test_what_cannot_be_judged_says_why() -> None:
         prescription(), GuardState(SideEffect(), SideEffect(0.5, reason="no_limit")), METRES
     )
     assert (few.kind, few.text) == ("none", "–")
-    assert few.words == ("not assessed: needs 10 strides at the start and 10 after them, on this side")
+    assert few.words == ("not assessed: requires 10 strides at the start and 10 afterwards on this side")
     assert (unlimited.kind, unlimited.change, unlimited.words) == ("none", 0.5, "no limit prescribed")
 
 

@@ -27,7 +27,7 @@ def test_the_headline_says_what_the_choice_of_a_filter_changes() -> None:
     assert view.sentences[0] == "Magnetometer: not used. Over the gait cycle: 4 left and 0 right strides."
     single_variant = replace(analysed.comparison(), filters=analysed.comparison().filters[:2])
     view = view_comparison(filter_run_files(single_variant)["filters.json"], "cycle")
-    assert "has no other to differ from" in view.headline
+    assert "there is no other filter to compare with" in view.headline
     assert (view.table, [panels for _, panels in view.groups if panels]) == ((), [])
     assert {row.to_median for row in view.rows} == {("", "")}
     assert view.rows[1].to_own != ("", "")

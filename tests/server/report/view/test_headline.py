@@ -166,12 +166,11 @@ def test_the_caption_says_whom_the_sentences_compare_with() -> None:
     single_standouts = find_standouts(parameter_rows((measured("gait_speed_mps", None, 0.80),), slow), slow)[
         0
     ]
-    assert Headline("", single_standouts).compared_with == "against people of this age"
+    assert Headline("", single_standouts).compared_with == "vs people of this age"
     uneven = find_standouts(parameter_rows(both_sides("foot_pitch_ic_deg", 5.0, 20.0)), Norms(None, None))[0]
-    assert Headline("", uneven).compared_with == "against the other side"
+    assert Headline("", uneven).compared_with == "vs the other side"
     assert (
-        Headline("", (*single_standouts, *uneven)).compared_with
-        == "against people of this age and the other side"
+        Headline("", (*single_standouts, *uneven)).compared_with == "vs people of this age and the other side"
     )
     assert Headline("").compared_with == ""
 
@@ -261,7 +260,7 @@ def test_a_clinically_relevant_change_is_told_before_a_larger_one() -> None:
     assert [s.name for s in changes] == ["knee_flexion_rom_deg", "gait_speed_mps"]
     headline = Headline("", changed=changes, changes=facts)
     assert [(c.title, c.side, c.size) for c in headline.changes_left] == [
-        ("Knee flexion, swing peak, from standing", "left", "+11.7")
+        ("Peak knee flexion in swing, relative to standing", "left", "+11.7")
     ]
 
 

@@ -163,7 +163,7 @@ def test_a_missing_number_gives_its_reason_never_zero() -> None:
     one = rows_of(of("stance_pct", "left", 61.0), of("stance_pct", "right", None, "no_strides"))[0]
     assert one.reason is None
     assert one.right is None
-    assert one.difference == "right not measured: no stride of this side counts"
+    assert one.difference == "right not measured: no included stride on this side"
 
 
 def test_a_side_withheld_beside_an_estimated_one_says_why() -> None:
@@ -260,7 +260,7 @@ def test_curves_say_their_zero_and_their_confidence(bundle: Bundle) -> None:
     assert panels["pelvis_rotation"].title == "Pelvic rotation, from its mean over the stride"
     assert panels["hip_rotation"].low_confidence
     assert not panels["hip_flexion"].low_confidence
-    assert panels["knee_flexion"].title == "Knee flexion, from standing"
+    assert panels["knee_flexion"].title == "Knee flexion, relative to standing"
 
 
 def test_source_and_number_of_the_norm_are_printed_or_why_there_is_none(bundle: Bundle) -> None:

@@ -42,7 +42,7 @@ def test_without_a_norm_the_note_is_the_reason_and_each_reason_is_told_once() ->
 def test_own_controls_say_how_many_they_are() -> None:
     nobody = Norms(None, None)
     assert norm_note([], [], nobody, controls()) == (
-        "Where no published norm compares: own controls, 12 people."
+        "Where no published norm is comparable: own controls, 12 people."
     )
     assert norm_note([], [], nobody, controls(note="small_group")).endswith("12 people, a small group.")
     few = controls(n=3, reason="few_controls")
@@ -76,11 +76,11 @@ def test_the_zero_of_curves_is_told_with_what_was_subtracted(bundle: Bundle) -> 
     offsets = {"knee_flexion_l": np.radians(4.6), "hip_adduction_l": 0.1, "ankle_dorsiflexion_x": 0.1}
     stood = replace(bundle, angles=replace(bundle.angles, zero_offset=offsets))
     message = notes(stood, panel(bundle, zero="standing"))
-    assert "Subtracted: knee flexion left 5°. A person" in message
+    assert "Subtracted: knee flexion left 5°. If the person" in message
     walked = notes(bundle, panel(bundle, zero="walking"))
-    assert walked.startswith("Nobody stood still in this take")
+    assert walked.startswith("No quiet standing in this trial")
     assert "Subtracted" not in walked
-    assert notes(bundle, panel(bundle, zero="anatomical")).startswith("Curves named anatomical start from")
+    assert notes(bundle, panel(bundle, zero="anatomical")).startswith("Curves from neutral use")
 
 
 def test_a_zero_of_curves_that_are_not_there_is_not_told(bundle: Bundle) -> None:
@@ -95,7 +95,9 @@ def test_curves_with_a_gap_are_named(bundle: Bundle) -> None:
         for side, c in whole.sides.items()
     }
     name = whole.variable.label.capitalize()
-    assert f"{name}: interrupted where the leg model's knee" in notes(bundle, replace(whole, sides=broken))
+    assert f"{name}: interrupted where the knee of the leg model" in notes(
+        bundle, replace(whole, sides=broken)
+    )
     assert "interrupted" not in notes(bundle, whole)
 
 

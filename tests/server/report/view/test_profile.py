@@ -32,7 +32,7 @@ def test_every_scored_curve_has_a_bar_and_the_profile_comes_last(make_bundle: Ma
 def test_what_it_leaves_out_and_compares_with_is_said(make_bundle: MakeBundle) -> None:
     profile = report_model(make_bundle()).profile
     assert profile is not None
-    assert "There is no GPS" in profile.note
+    assert "GPS not available" in profile.note
     german = load_catalogue("de").translate(profile.note)
     assert "Es gibt keinen GPS: Beckenrotation, Fußstellung zur Gehrichtung (nicht gemessen: " in german
     assert "42 healthy adults" in profile.note

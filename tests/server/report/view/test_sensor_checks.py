@@ -31,15 +31,15 @@ def test_a_pelvis_is_said_to_be_beyond_judging_and_is_no_warning() -> None:
     assert view is not None
     pelvis, thigh = view.rows
     assert (pelvis.sensor, pelvis.place, pelvis.place_kind) == ("Pelvis", f"Placement {NOT_JUDGED}", "")
-    assert (thigh.place, thigh.place_kind) == ("Stayed from 14 to 21\u202fs", "ok")
-    assert sum("pelvis sensor cannot be seen" in n for n in view.notes) == 1
+    assert (thigh.place, thigh.place_kind) == ("Stable from 14 to 21\u202fs", "ok")
+    assert sum("pelvis sensor cannot be detected" in n for n in view.notes) == 1
 
 
 def test_an_older_analysis_does_not_vouch_for_a_place() -> None:
     old = {k: x for k, x in sensor("foot_l").items() if k != "place_judged_s"}
     view = sensor_checks(found({**old, "place_judged": True}, sensor("foot_r")))
     assert view is not None
-    assert [r.place for r in view.rows] == [f"Placement {NOT_JUDGED}", "Stayed from 14 to 21\u202fs"]
+    assert [r.place for r in view.rows] == [f"Placement {NOT_JUDGED}", "Stable from 14 to 21\u202fs"]
 
 
 def test_what_was_found_stands_in_its_row() -> None:
@@ -54,9 +54,9 @@ def test_what_was_found_stands_in_its_row() -> None:
     )
     assert view is not None
     assert view.exchanged == "left shank and right shank"
-    assert view.rows[0].clock == "Clock 41\u202fms early, put right"
+    assert view.rows[0].clock == "Clock 41\u202fms early, corrected"
     assert view.rows[1].place == "Slipped 14° about 32\u202fs"
-    assert view.rows[2].clock == "Clock runs slow, 33\u202fms over the take, left so"
+    assert view.rows[2].clock == "Clock runs slow, 33\u202fms over the trial, not corrected"
     assert view.rows[3].clock == "Clock appears wrong, see notices"
     assert {r.clock_kind for r in (view.rows[0], view.rows[2], view.rows[3])} == {"warn"}
 

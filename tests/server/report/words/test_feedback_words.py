@@ -72,7 +72,7 @@ def test_a_schedule_says_shares_probes_and_retention() -> None:
     assert schedule_words(prescription(schedule=one)) == f"60{NBSP}% of the strides"
     probed = every | {"probe_every": 40, "probe_strides": 10, "retention_strides": 20}
     assert schedule_words(prescription(schedule=probed)) == (
-        "every stride; after every 40, 10 without; a visit after a training begins with 20 without"
+        "every stride; after every 40, 10 without; a visit after a training starts with 20 without"
     )
 
 
@@ -90,8 +90,8 @@ def test_zone_and_level_say_their_width_and_when_it_becomes_harder() -> None:
         "starts at level 3; changed manually"
     )
     assert words("Level") == (
-        f"begins as hard as the last walk allows; harder when more than 70{NBSP}% of 20 strides are in the "
-        f"zone, easier when more than 50{NBSP}% are far off"
+        f"starts as difficult as the last walk allows; harder when more than 70{NBSP}% of 20 strides are in "
+        f"the zone, easier when more than 50{NBSP}% are far off target"
     )
 
 

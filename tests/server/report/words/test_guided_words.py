@@ -32,6 +32,6 @@ def test_who_has_to_move_at_go_is_told_so_before(protocol: str) -> None:
 
 
 def test_who_closes_the_eyes_has_somebody_beside_them() -> None:
-    assert "Somebody stands beside you." in tell_person("standing_eyes_closed", "get_ready")
+    assert "Someone is next to you." in tell_person("standing_eyes_closed", "get_ready")
     assert tell_person("standing_eyes_closed", "running").endswith("Eyes closed.")
     assert tell_person("standing_eyes_open", "running").endswith("Eyes open.")
