@@ -1,6 +1,6 @@
-"""All laws that need the sensors' signals, on one recording; those of the contacts alone are in feet.py.
+"""Consistency checks of one recording from the sensors' signals; those of contacts alone are in feet.py.
 
-What they find is kept with the recording's tracks, so that it holds after an edit as well.
+Their results are stored with the recording's tracks, so that they remain valid after an edit.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sagittal.core.signals.recording import UniformRecording
 def judge_sensors(
     recording: UniformRecording, events: GaitEvents, bouts: Sequence[Bout], *, treadmill: bool = False
 ) -> tuple[Doubt, ...]:
-    """What the signals contradict; nothing where too little was walked to tell.
+    """Doubts raised by the signals of a recording; none if there is too little walking.
 
     Parameters
     ----------
@@ -29,12 +29,12 @@ def judge_sensors(
     """
     working = drop_stuck_sensors(recording)
     rate_hz = working.rate_hz
-    found: list[Doubt | None] = []
+    doubts: list[Doubt | None] = []
     trunk = next((s for s in TRUNK if s in working.sensors), None)
     if trunk is not None:
-        found.append(judge_tilting(trunk, working.sensors[trunk], working.t_s, bouts, rate_hz))
+        doubts.append(judge_tilting(trunk, working.sensors[trunk], working.t_s, bouts, rate_hz))
     if "pelvis" in working.sensors:
-        found.append(judge_echo(working.sensors["pelvis"], events, rate_hz))
+        doubts.append(judge_echo(working.sensors["pelvis"], events, rate_hz))
     if events.events:
-        found.append(judge_rate(working, treadmill=treadmill))
-    return tuple(x for x in found if x is not None)
+        doubts.append(judge_rate(working, treadmill=treadmill))
+    return tuple(x for x in doubts if x is not None)

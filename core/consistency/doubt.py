@@ -1,4 +1,4 @@
-"""What a law of consistency found: the notice, and which parameters are not reported because of it."""
+"""Result of a consistency check: the notice, and the parameters that are suppressed because of it."""
 
 from __future__ import annotations
 

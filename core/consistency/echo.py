@@ -57,12 +57,12 @@ def measure_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> C
     lost = np.concatenate(([0], np.cumsum(~pelvis.valid)))
     parts: dict[Side, Floats] = {}
     for side in SIDES:
-        at = np.round(np.array(events.times(side, "ic")) * rate_hz).astype(np.int64)
-        at = at[(at >= around) & (at + around < len(shake))]
-        at = at[lost[at + around + 1] == lost[at - around]]
-        if len(at) < LEAST_CONTACTS:
+        samples = np.round(np.array(events.times(side, "ic")) * rate_hz).astype(np.int64)
+        samples = samples[(samples >= around) & (samples + around < len(shake))]
+        samples = samples[lost[samples + around + 1] == lost[samples - around]]
+        if len(samples) < LEAST_CONTACTS:
             return None
-        parts[side] = shake[at[:, None] + np.arange(-around, around + 1)]
+        parts[side] = shake[samples[:, None] + np.arange(-around, around + 1)]
     most = round(FURTHEST_S * rate_hz)
     # a contact that is stamped late sees its shake early
     lag, alike = _find_lag(np.median(parts["right"], axis=0), np.median(parts["left"], axis=0), most)
@@ -75,16 +75,16 @@ def measure_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> C
 
 
 def judge_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> Doubt | None:
-    """A doubt where one foot is late; None where the feet keep time or too little was walked to tell."""
-    found = measure_echo(pelvis, events, rate_hz)
-    if found is None or found.alike < ALIKE or abs(found.lag_s) < max(LEAST_S, SCATTER * found.sd_s):
+    """Doubt about a clock offset of one foot; None if the feet are synchronous or walked too little."""
+    echo = measure_echo(pelvis, events, rate_hz)
+    if echo is None or echo.alike < ALIKE or abs(echo.lag_s) < max(LEAST_S, SCATTER * echo.sd_s):
         return None
-    late: Side = "right" if found.lag_s > 0 else "left"
+    late: Side = "right" if echo.lag_s > 0 else "left"
     return Doubt(
         Notice(
             LATE_FOOT,
-            f"Contacts of the {'right' if found.lag_s > 0 else 'left'} foot shake the lower back "
-            f"{1000 * abs(found.lag_s):.0f} ± {2000 * found.sd_s:.0f} ms before they are timed: the clock "
+            f"Contacts of the {'right' if echo.lag_s > 0 else 'left'} foot shake the lower back "
+            f"{1000 * abs(echo.lag_s):.0f} ± {2000 * echo.sd_s:.0f} ms before they are timed: the clock "
             "of that foot is late. Parameters between the feet are suppressed. Synchronise the sensors and "
             "record again.",
             FOOT[late],

@@ -65,9 +65,9 @@ def judge_feet(
 def _count_contacts(
     events: GaitEvents, side: Side, bouts: Sequence[Bout], is_measured: Callable[[Side, Floats], Bools]
 ) -> int:
-    at = np.array(events.times(side, "ic"), np.float64)
-    at = at[is_measured("right" if side == "left" else "left", at)]
-    return sum(int(((at >= b.first_s - 1e-6) & (at <= b.end_s + 1e-6)).sum()) for b in bouts)
+    times_s = np.array(events.times(side, "ic"), np.float64)
+    times_s = times_s[is_measured("right" if side == "left" else "left", times_s)]
+    return sum(int(((times_s >= b.first_s - 1e-6) & (times_s <= b.end_s + 1e-6)).sum()) for b in bouts)
 
 
 def _find_stride_time(strides: Strides, side: Side) -> float | None:

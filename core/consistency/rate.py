@@ -1,8 +1,8 @@
-"""The declared sampling rate against gravity: what a foot feels from rest to rest adds up to gravity.
+"""Check of the declared sampling rate: the mean specific force of a foot over a stride equals gravity.
 
 A foot that rests before and after a stride has, over the stride, a mean specific force of length g in a frame
-that does not turn. A rate that is wrong by k turns that frame k times too far. Both feet must say the same; a
-gyroscope whose scale is wrong looks alike, so it asks, and nothing is rescaled
+that does not rotate. A rate that is wrong by a factor k rotates that frame k times too far. Both feet must
+agree. A wrong gyroscope scale has the same effect, so the notice asks for a check and nothing is rescaled
 (docs/science/consistency.md, "Sampling rate").
 """
 
@@ -55,7 +55,7 @@ class RateEvidence:
 
 
 def measure_rate(foot: SensorSignals, flats: NDArray[np.int64], rate_hz: float) -> RateEvidence | None:
-    """Factor of the rate at which gravity has its length over each stride of one foot; None if not told.
+    """Factor of the rate at which gravity has its length over each stride of one foot; None if undetermined.
 
     Parameters
     ----------
@@ -88,19 +88,19 @@ def judge_rate(recording: UniformRecording, *, treadmill: bool) -> Doubt | None:
     borders = cut_strides(recording)
     if treadmill or not all(foot in borders for foot in FOOT.values()):
         return None
-    found = []
+    rates = []
     for foot in FOOT.values():
         signals, rate_hz = recording.sensors[foot], recording.rate_hz
         strides = measure_stride_gravity(foot, signals, borders[foot], rate_hz)
         evidence = measure_rate(signals, np.round(strides.at_s * rate_hz).astype(np.int64), rate_hz)
         if evidence is None:
             return None
-        found.append(evidence)
-    left, right = found
+        rates.append(evidence)
+    left, right = rates
     if abs(left.factor - right.factor) > AGREE:
         return None
-    weights = [1.0 / x.sd**2 for x in found]
-    factor = sum(w * x.factor for w, x in zip(weights, found, strict=True)) / sum(weights)
+    weights = [1.0 / x.sd**2 for x in rates]
+    factor = sum(w * x.factor for w, x in zip(weights, rates, strict=True)) / sum(weights)
     sd = 1.0 / sqrt(sum(weights))
     if abs(factor - 1.0) < max(LEAST, SCATTER * sd):
         return None

@@ -36,18 +36,18 @@ SLOW_HZ: Final = 3.0
 def measure_coincidence(events: GaitEvents) -> float | None:
     """Share of contacts at which the other foot lands too, of the foot with fewer; None with few contacts."""
     shares = []
-    for side, other in zip(SIDES, SIDES[::-1], strict=True):
-        own, opposite = (np.array(events.times(s, "ic")) for s in (side, other))
+    for side, opposite_side in zip(SIDES, SIDES[::-1], strict=True):
+        own, opposite = (np.array(events.times(s, "ic")) for s in (side, opposite_side))
         if min(len(own), len(opposite)) < LEAST_CONTACTS:
             return None
         strides = np.diff(own)
         walked = strides[strides < LONGEST_S]
         if not len(walked):
             return None
-        after = np.searchsorted(opposite, own)
+        next_index = np.searchsorted(opposite, own)
         nearest = np.minimum(
-            np.abs(opposite[np.minimum(after, len(opposite) - 1)] - own),
-            np.abs(opposite[np.maximum(after - 1, 0)] - own),
+            np.abs(opposite[np.minimum(next_index, len(opposite) - 1)] - own),
+            np.abs(opposite[np.maximum(next_index - 1, 0)] - own),
         )
         shares.append(float(np.mean(nearest < TOGETHER * np.median(walked))))
     return min(shares)

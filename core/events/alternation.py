@@ -40,20 +40,20 @@ class AlternationParams:
 
 def measure_foot_lag(events: GaitEvents, params: AlternationParams) -> float | None:
     """Apparent delay of the right foot relative to the left one, s; None with too few steps."""
-    after: dict[Side, Floats] = {}
-    for side, other in zip(SIDES, reversed(SIDES), strict=True):
-        contact, lift = np.array(events.times(side, "ic")), np.sort(events.times(other, "tc"))
+    lags: dict[Side, Floats] = {}
+    for side, opposite in zip(SIDES, reversed(SIDES), strict=True):
+        contact, lift = np.array(events.times(side, "ic")), np.sort(events.times(opposite, "tc"))
         if not len(contact) or not len(lift):
             return None
         # the lifts before and after; all pairs would take gigabytes of a take of hours
         next_one = np.searchsorted(lift, contact)
-        before = lift[np.maximum(next_one - 1, 0)] - contact
-        behind = lift[np.minimum(next_one, len(lift) - 1)] - contact
-        nearest = np.where(np.abs(before) <= np.abs(behind), before, behind)
-        after[side] = nearest[np.abs(nearest) < FURTHEST_S]
-        if len(after[side]) < params.least_steps:
+        previous_lag = lift[np.maximum(next_one - 1, 0)] - contact
+        next_lag = lift[np.minimum(next_one, len(lift) - 1)] - contact
+        nearest = np.where(np.abs(previous_lag) <= np.abs(next_lag), previous_lag, next_lag)
+        lags[side] = nearest[np.abs(nearest) < FURTHEST_S]
+        if len(lags[side]) < params.least_steps:
             return None
-    return 0.5 * float(np.median(after["left"]) - np.median(after["right"]))
+    return 0.5 * float(np.median(lags["left"]) - np.median(lags["right"]))
 
 
 def tell_foot_lag(events: GaitEvents, params: AlternationParams) -> tuple[Notice, ...]:

@@ -120,7 +120,7 @@ def walking_bouts(
     standing : windows without movement of the feet; stops are reported only within these.
     """
     params = params or BoutParams()
-    found = []
+    bouts = []
     ended = -inf
     for run in _walks(contacts, feet, params):
         steps = np.diff(run)
@@ -131,7 +131,7 @@ def walking_bouts(
         least = params.stand_s + (0.0 if feet == 2 else typical)
         start = next((t for t in leavings if max(ended, run[0] - params.break_s) < t < run[0]), run[0])
         ended = run[-1]
-        found.append(
+        bouts.append(
             Bout(
                 start_s=start,
                 first_s=run[0],
@@ -140,11 +140,11 @@ def walking_bouts(
                 step_s=typical,
                 breaks=breaks,
                 stops=tuple(x for x in breaks if any(_overlap(x, w) >= least for w in standing)),
-                from_rest=_touches(rests, start, params.near_s, before=True),
-                to_rest=_touches(rests, run[-1], params.near_s, before=False),
+                from_rest=_touches(rests, start, params.near_s, ends_before=True),
+                to_rest=_touches(rests, run[-1], params.near_s, ends_before=False),
             )
         )
-    return tuple(found)
+    return tuple(bouts)
 
 
 def plain_bouts(contacts: Sequence[float], params: WalkParams) -> tuple[Bout, ...]:
@@ -181,13 +181,13 @@ def _walks(contacts: Sequence[float], feet: int, params: WalkParams) -> list[lis
     return [run for run in runs if len(run) - feet >= least]
 
 
-def _overlap(one: Window, other: Window) -> float:
+def _overlap(first: Window, second: Window) -> float:
     """Overlap of two ranges, s."""
-    return min(one[1], other[1]) - max(one[0], other[0])
+    return min(first[1], second[1]) - max(first[0], second[0])
 
 
-def _touches(rests: Sequence[Window] | None, t: float, near_s: float, *, before: bool) -> bool | None:
-    """Whether a rest ends shortly before t, or starts shortly after it."""
+def _touches(rests: Sequence[Window] | None, t: float, near_s: float, *, ends_before: bool) -> bool | None:
+    """Whether a rest ends shortly before t (`ends_before`), or starts shortly after it."""
     if rests is None:
         return None
-    return any(-0.5 <= (t - end if before else start - t) <= near_s for start, end in rests)
+    return any(-0.5 <= (t - end if ends_before else start - t) <= near_s for start, end in rests)

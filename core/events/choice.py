@@ -1,9 +1,9 @@
-"""Which of two finders of contacts a foot is to be believed: by pitch and movement, or by the way it moves.
+"""Choice between two contact detectors for a foot: pitch and movement, or displacement.
 
-Most feet tip as they leave and land, and are found by that to a few milliseconds. A foot that is drawn
-along the floor or carried flat does not, and what its pitch shows is then not contact. Its way does not lie:
-a foot cannot have landed that still goes somewhere. Where most of the swings by way have no contact at their
-end, the pitch has misread this foot (docs/science/events.md, "Swings by their way").
+Most feet pitch at foot-off and contact, which times both to a few milliseconds. A foot that is dragged along
+the floor or carried flat does not, and the extrema of its pitch are then not contacts. Its displacement is
+still reliable: a foot that moves on has not landed. Where most swings by displacement have no contact by
+pitch at their end, pitch is rejected for this foot (docs/science/events.md, "Swings by their way").
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ LEAST: Final = 3
 
 
 def count_seen(by_way: Sequence[float] | Floats, by_pitch: Sequence[float] | Floats) -> int:
-    """How many of the contacts by way, s, have one by pitch beside them."""
+    """Number of contacts by displacement, s, with a contact by pitch close in time."""
     way, pitch = np.asarray(by_way, np.float64), np.sort(np.asarray(by_pitch, np.float64))
     if not len(way) or not len(pitch):
         return 0
-    after = np.clip(np.searchsorted(pitch, way), 0, len(pitch) - 1)
-    before = np.maximum(after - 1, 0)
-    apart = np.minimum(np.abs(pitch[after] - way), np.abs(pitch[before] - way))
+    next_index = np.clip(np.searchsorted(pitch, way), 0, len(pitch) - 1)
+    previous_index = np.maximum(next_index - 1, 0)
+    apart = np.minimum(np.abs(pitch[next_index] - way), np.abs(pitch[previous_index] - way))
     return int((apart <= SAME_S).sum())
 
 

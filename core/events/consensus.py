@@ -67,14 +67,14 @@ class ConsensusParams:
     gyro_peaks: GyroPeakPresets = field(default_factory=GyroPeakPresets)
 
     def __post_init__(self) -> None:
-        known = self.gyro_peaks.by_name
-        if unknown := [name for name in self.presets if name not in known]:
+        detectors = self.gyro_peaks.by_name
+        if unknown := [name for name in self.presets if name not in detectors]:
             raise ParameterError(
                 "unknown_detector",
                 Message(
                     "There is no detector '{unknown}'; expected one of {known}.",
                     unknown=unknown[0],
-                    known=", ".join(known),
+                    known=", ".join(detectors),
                 ),
             )
 
@@ -103,31 +103,35 @@ def all_detectors(
     refined : result of `detect_contacts`, which then leads; None = the foot-pitch rule leads.
     """
     params = params or ConsensusParams()
-    found = {PITCH_RULE: detect(orientations, foot_pitch)} if refined is None else {REFINED: refined}
+    events_by_detector = (
+        {PITCH_RULE: detect(orientations, foot_pitch)} if refined is None else {REFINED: refined}
+    )
     presets = params.gyro_peaks.by_name
     for name in params.presets:
         preset = presets[name]
         if any(LIMB[preset.segment][side] in orientations.q for side in SIDES):
-            found[name] = gyro_peak_events(orientations, orientations.rate_hz, preset)
-    return found
+            events_by_detector[name] = gyro_peak_events(orientations, orientations.rate_hz, preset)
+    return events_by_detector
 
 
-def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+def rate_confidence(
+    events_by_detector: Mapping[str, GaitEvents], params: ConsensusParams | None = None
+) -> GaitEvents:
     """The lead's contacts, unchanged in number, with the fraction of detectors that found each.
 
     Parameters
     ----------
-    found : detector → its events; the first leads. For a foot without other votes the confidence remains
-        None.
+    events_by_detector : detector → its events; the first leads. For a foot without other votes the confidence
+        remains None.
 
     Returns
     -------
     The lead's events and notices; `others_found_contacts` if the lead abstained and two others did not.
     """
     params = params or ConsensusParams()
-    name, lead = next(iter(found.items()))
+    name, lead = next(iter(events_by_detector.items()))
     notices = list(lead.notices)
-    own = _sort_all(found)
+    own = _sort_all(events_by_detector)
     shares: dict[tuple[Side, EventKind, float], float] = {}
     for side in SIDES:
         voters = _voters(own, side)
@@ -144,12 +148,14 @@ def rate_confidence(found: Mapping[str, GaitEvents], params: ConsensusParams | N
     return replace(lead, events=events, notices=tuple(notices))
 
 
-def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams | None = None) -> GaitEvents:
+def agree_on_contacts(
+    events_by_detector: Mapping[str, GaitEvents], params: ConsensusParams | None = None
+) -> GaitEvents:
     """Contacts that enough detectors agree on.
 
     Parameters
     ----------
-    found : detector → its events, all for one recording; the first leads.
+    events_by_detector : detector → its events, all for one recording; the first leads.
 
     Returns
     -------
@@ -158,10 +164,10 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
     `detectors_disagree` the number of contacts of a foot that only few detectors found.
     """
     params = params or ConsensusParams()
-    lead = next(iter(found))
+    lead = next(iter(events_by_detector))
     events: list[GaitEvent] = []
-    notices = list(found[lead].notices)
-    own = _sort_all(found)
+    notices = list(events_by_detector[lead].notices)
+    own = _sort_all(events_by_detector)
     for side in SIDES:
         voters = _voters(own, side)
         if not voters:
@@ -180,22 +186,22 @@ def agree_on_contacts(found: Mapping[str, GaitEvents], params: ConsensusParams |
                     dropped += 1
                     continue
                 time = led.time_s if led is not None else float(np.median([v.time_s for v in votes]))
-                known = max(v.detected_s for v in votes)
+                detection_s = max(v.detected_s for v in votes)
                 sd = None if led is None else led.uncertainty_s
                 if shank:
                     time += params.shank_early_s if kind == "ic" else 0.0
                     sd = params.shank_sd_s
-                events.append(GaitEvent(time, side, kind, SOURCE, max(known, time), share, sd))
+                events.append(GaitEvent(time, side, kind, SOURCE, max(detection_s, time), share, sd))
         if dropped:
             notices.append(_disagree(side, dropped, len(voters)))
     events.sort(key=lambda e: (e.time_s, e.side, e.kind))
-    return GaitEvents(tuple(events), tuple(notices), {"detectors": tuple(found)})
+    return GaitEvents(tuple(events), tuple(notices), {"detectors": tuple(events_by_detector)})
 
 
-def _sort_all(found: Mapping[str, GaitEvents]) -> dict[str, _Sorted]:
+def _sort_all(events_by_detector: Mapping[str, GaitEvents]) -> dict[str, _Sorted]:
     """Detector → its events by foot and kind."""
     every: dict[str, _Sorted] = {}
-    for name, events in found.items():
+    for name, events in events_by_detector.items():
         own: dict[tuple[Side, EventKind], list[GaitEvent]] = {(s, k): [] for s in SIDES for k in KINDS}
         for event in events.events:
             own[event.side, event.kind].append(event)
@@ -203,30 +209,30 @@ def _sort_all(found: Mapping[str, GaitEvents]) -> dict[str, _Sorted]:
     return every
 
 
-def _voters(found: Mapping[str, _Sorted], side: Side) -> dict[str, _Sorted]:
+def _voters(sorted_events: Mapping[str, _Sorted], side: Side) -> dict[str, _Sorted]:
     """Detectors that found contacts of a foot, in their order."""
-    return {name: own for name, own in found.items() if own[side, "ic"]}
+    return {name: own for name, own in sorted_events.items() if own[side, "ic"]}
 
 
 def _clusters(
     voters: Mapping[str, _Sorted], side: Side, kind: EventKind, params: ConsensusParams
 ) -> list[list[_Vote]]:
     """Contacts to be merged, with at most one vote per detector, in chronological order."""
-    lead, *others = voters
+    lead, *followers = voters
     reference = [e.time_s for e in voters[lead][side, kind]]
     clusters = [[v] for v in _votes(lead, voters[lead][side, kind])]
-    for name in others:
+    for name in followers:
         times = [c[0].time_s for c in clusters]
-        taken: set[int] = set()
+        used_clusters: set[int] = set()
         free = []
         for vote in _moved(_votes(name, voters[name][side, kind]), reference, params):
             first = bisect_left(times, vote.time_s - params.window_s)
             end = bisect_right(times, vote.time_s + params.window_s)
-            near = [(abs(times[i] - vote.time_s), i) for i in range(first, end) if i not in taken]
+            near = [(abs(times[i] - vote.time_s), i) for i in range(first, end) if i not in used_clusters]
             if near:
-                at = min(near)[1]
-                taken.add(at)
-                clusters[at].append(vote)
+                index = min(near)[1]
+                used_clusters.add(index)
+                clusters[index].append(vote)
             else:
                 free.append([vote])
         clusters = sorted(clusters + free, key=lambda c: c[0].time_s)
@@ -244,10 +250,10 @@ def _moved(votes: list[_Vote], lead: Sequence[float], params: ConsensusParams) -
     if not lead or not votes:
         return votes
     reference, times = np.array(lead), np.array([v.time_s for v in votes])
-    after = np.clip(np.searchsorted(reference, times), 0, len(reference) - 1)
-    before = np.maximum(after - 1, 0)
-    nearer = np.abs(reference[before] - times) <= np.abs(reference[after] - times)
-    off = times - reference[np.where(nearer, before, after)]
+    next_index = np.clip(np.searchsorted(reference, times), 0, len(reference) - 1)
+    previous_index = np.maximum(next_index - 1, 0)
+    nearer = np.abs(reference[previous_index] - times) <= np.abs(reference[next_index] - times)
+    off = times - reference[np.where(nearer, previous_index, next_index)]
     off = off[np.abs(off) <= params.pair_s]
     if len(off) < params.pairs:
         return votes

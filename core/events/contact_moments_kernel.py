@@ -110,19 +110,19 @@ def refine_landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type:
             while j >= start and rate_at(pitch, j, rate_hz) < level:
                 j -= 1
             if j >= start:
-                here, after = rate_at(pitch, j, rate_hz), rate_at(pitch, j + 1, rate_hz)
-                at = j + 0.5 + (level - here) / (after - here)
+                current_rate, next_rate = rate_at(pitch, j, rate_hz), rate_at(pitch, j + 1, rate_hz)
+                sample = j + 0.5 + (level - current_rate) / (next_rate - current_rate)
                 start += rule.apart
                 if not moves or start > place:
-                    return at, rule.contact_sd_s
+                    return sample, rule.contact_sd_s
                 hardest = 0.0
                 for j in range(start, place + 2):
                     hardest = max(hardest, knock_at(acc, j, rule.apart))
                 j = start
                 while knock_at(acc, j, rule.apart) < rule.contact_share * hardest:
                     j += 1
-                half = 0.5 * (j - 0.5 * rule.apart - at)
-                return at + half, sqrt(rule.contact_sd_s**2 + (half / rate_hz) ** 2)
+                half = 0.5 * (j - 0.5 * rule.apart - sample)
+                return sample + half, sqrt(rule.contact_sd_s**2 + (half / rate_hz) ** 2)
     # no slap: the foot came down flat or on its tip
     peak, place = 0.0, first
     for j in range(first, min(top, last - 1) + 1):
@@ -148,8 +148,8 @@ def refine_landing(pitch, acc, top, first, last, moves, rate_hz, rule):  # type:
         j -= 1
     if j >= last - 1:
         return np.nan, rule.late_sd_s
-    here, after = rate_at(pitch, j, rate_hz), rate_at(pitch, j + 1, rate_hz)
-    return j + 0.5 + (level - here) / min(after - here, -1e-9), rule.flat_sd_s
+    current_rate, next_rate = rate_at(pitch, j, rate_hz), rate_at(pitch, j + 1, rate_hz)
+    return j + 0.5 + (level - current_rate) / min(next_rate - current_rate, -1e-9), rule.flat_sd_s
 
 
 @inner_njit()
@@ -168,14 +168,14 @@ def refine_leaving(pitch, bottom, first, rate_hz, rule):  # type: ignore[no-unty
     j = place
     while j < bottom and rate_at(pitch, j, rate_hz) < level:
         j += 1
-    before, here = rate_at(pitch, j - 1, rate_hz), rate_at(pitch, j, rate_hz)
-    if here <= before:
+    previous_rate, current_rate = rate_at(pitch, j - 1, rate_hz), rate_at(pitch, j, rate_hz)
+    if current_rate <= previous_rate:
         return np.nan, rule.late_sd_s
-    at = j - 0.5 + (level - before) / (here - before)
-    width = (bottom - at) / rate_hz
+    sample = j - 0.5 + (level - previous_rate) / (current_rate - previous_rate)
+    width = (bottom - sample) / rate_hz
     if width > rule.push_s:
         return np.nan, rule.late_sd_s
-    return at, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
+    return sample, sqrt(rule.leaving_sd_s**2 + 0.25 * width * width)
 
 
 @inner_njit()
@@ -183,11 +183,11 @@ def guess_leaving(pitch, start, middle, reach, rule):  # type: ignore[no-untyped
     """Sample of the minimum pitch, foot-off and its uncertainty (s) for a movement from `start` on."""
     size = pitch.shape[0]
     bottom = lowest(pitch, start, middle)
-    at, sd = np.nan, 0.0
+    sample, sd = np.nan, 0.0
     if bottom < middle - 1 and pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
-        at, sd = refine_leaving(pitch, bottom, reach, rule.rate_hz, rule)
-    if at != at:
+        sample, sd = refine_leaving(pitch, bottom, reach, rule.rate_hz, rule)
+    if sample != sample:
         # the foot left the floor without a push
         bottom = min(start + rule.onset, middle)
-        at, sd = float(bottom), 2.0 * rule.loose_sd_s
-    return bottom, at, max(sd, rule.loose_sd_s)
+        sample, sd = float(bottom), 2.0 * rule.loose_sd_s
+    return bottom, sample, max(sd, rule.loose_sd_s)

@@ -89,8 +89,8 @@ def detect_contacts(
         for part in cut_blocks(len(q)):
             moved = None if motion is None else motion.cut(part)
             signals = () if moved is None else (moved.speed, moved.acc)
-            told = advance_foot_contacts(state, q[part], valid[part], *signals)
-            for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
+            reports = advance_foot_contacts(state, q[part], valid[part], *signals)
+            for _ in read_reports(reports, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
                 pass
         by_pitch = list(latest.values())
         if motion is None:
@@ -116,14 +116,14 @@ def find_by_way(
         state.learn(q[part], valid[part])
     latest: dict[int, GaitEvent] = {}
     for part in cut_blocks(len(q)):
-        told = advance_foot_ways(state, q[part], valid[part], motion.cut(part).acc)
-        for _ in read_reports(told, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
+        reports = advance_foot_ways(state, q[part], valid[part], motion.cut(part).acc)
+        for _ in read_reports(reports, side, float(orientations.t_s[0]), orientations.rate_hz, latest):
             pass
     return list(latest.values())
 
 
 def read_reports(
-    told: ContactReports, side: Side, start_s: float, rate_hz: float, latest: dict[int, GaitEvent]
+    reports: ContactReports, side: Side, start_s: float, rate_hz: float, latest: dict[int, GaitEvent]
 ) -> Iterator[tuple[int, bool, GaitEvent]]:
     """Yield sample at which an event is reported, whether the report is final, and the event.
 
@@ -132,19 +132,19 @@ def read_reports(
     start_s : time of sample 0. latest : number → event as last reported, including earlier blocks; updated in
         place. Only the last few events can be reported again.
     """
-    for kind, number, known, last, at, uncertainty in zip(*told, strict=True):
+    for kind, number, detection, last, sample, uncertainty in zip(*reports, strict=True):
         first = latest.get(int(number))
         event = GaitEvent(
-            time_s=start_s + float(at) / rate_hz,
+            time_s=start_s + float(sample) / rate_hz,
             side=side,
             kind=KINDS[kind],
             source=SOURCE,
-            detected_s=start_s + int(known) / rate_hz if first is None else first.detected_s,
+            detected_s=start_s + int(detection) / rate_hz if first is None else first.detected_s,
             uncertainty_s=float(uncertainty),
             first_s=None if first is None else first.time_s,
         )
         latest[int(number)] = event
-        yield int(known), bool(last), event
+        yield int(detection), bool(last), event
 
 
 def detect(orientations: Orientations, params: FootPitchParams | None = None) -> GaitEvents:
@@ -196,15 +196,15 @@ def _each_foot(
             notices.extend(n for n in no_rest if n not in notices)
             continue
         s, valid = pitch_signal(orientations.q[foot]), orientations.valid[foot]
-        found, by_way = find(side)
-        events.extend(found)
+        contacts, by_way = find(side)
+        events.extend(contacts)
         figures[foot] = PitchFigures(
             s_min=float(s[valid].min(initial=1.0)),
             s_max=float(s[valid].max(initial=-1.0)),
             s_quiet=_quiet_level(orientations.q[foot], s, valid, orientations.rate_hz, params),
-            s_flat=_flat_level(found, s, valid, orientations),
-            n_ic=sum(e.kind == "ic" for e in found),
-            n_tc=sum(e.kind == "tc" for e in found),
+            s_flat=_flat_level(contacts, s, valid, orientations),
+            n_ic=sum(e.kind == "ic" for e in contacts),
+            n_tc=sum(e.kind == "tc" for e in contacts),
         )
         notices.extend(_remarks(side, figures[foot], params, by_way=by_way))
     if params.threshold != FootPitchParams.threshold and figures:
@@ -217,7 +217,7 @@ def _pitch_events(
     side: Side, s: Floats, valid: Bools, orientations: Orientations, params: FootPitchParams
 ) -> list[GaitEvent]:
     """Apply the rule to one foot over the whole recording."""
-    kind, index, known, offset = advance_foot_pitch(
+    kind, index, detections, offset = advance_foot_pitch(
         FootPitchState.start(orientations.rate_hz, params), s, valid
     )
     step = 1.0 / orientations.rate_hz
@@ -227,9 +227,9 @@ def _pitch_events(
             side=side,
             kind=KINDS[k],
             source=PITCH_RULE,
-            detected_s=float(orientations.t_s[at]),
+            detected_s=float(orientations.t_s[detection]),
         )
-        for k, j, at, o in zip(kind, index, known, offset, strict=True)
+        for k, j, detection, o in zip(kind, index, detections, offset, strict=True)
     ]
 
 

@@ -67,11 +67,11 @@ class Edit:
             raise _bad(f"{self.kind} got to_s {self.to_s}; a move, and only a move, says where to")
         if not all(isfinite(t) for t in (self.time_s, self.to_s) if t is not None):
             raise _bad("times are finite seconds from the start of the recording")
-        said = (self.reason or "").strip()
-        if bool(said) != (self.kind == "exclude_stride") or len(said) > REASON_LENGTH:
+        reason_text = (self.reason or "").strip()
+        if bool(reason_text) != (self.kind == "exclude_stride") or len(reason_text) > REASON_LENGTH:
             raise _bad(
-                f"{self.kind} got a reason of {len(said)} characters; leaving a stride out, and only that, "
-                f"needs one of 1 to {REASON_LENGTH}"
+                f"{self.kind} got a reason of {len(reason_text)} characters; leaving a stride out, "
+                f"and only that, needs one of 1 to {REASON_LENGTH}"
             )
 
     def to_json(self) -> dict[str, Any]:
@@ -95,19 +95,19 @@ def apply_event_edits(events: GaitEvents, edits: Iterable[Edit], duration_s: flo
     ParameterError `no_such_event`; `event_outside` the recording; `event_order`: it would pass another event
         of its foot, or come within `APART_S` of it.
     """
-    found = list(events.events)
+    contacts = list(events.events)
     for edit in edits:
         if not edit.kind.endswith("event"):
             continue
         to_s = edit.time_s if edit.to_s is None else edit.to_s
         _refuse_outside(to_s, duration_s)
         if edit.kind != "add_event":
-            old = found.pop(_place(found, edit))
-            _refuse_passing(found, edit, old.time_s, to_s)
+            old = contacts.pop(_place(contacts, edit))
+            _refuse_passing(contacts, edit, old.time_s, to_s)
         if edit.kind != "delete_event":
-            _put(found, edit, to_s)
-    found.sort(key=lambda e: e.time_s)
-    return replace(events, events=tuple(found))
+            _put(contacts, edit, to_s)
+    contacts.sort(key=lambda e: e.time_s)
+    return replace(events, events=tuple(contacts))
 
 
 def apply_stride_edits(strides: Strides, edits: Iterable[Edit]) -> Strides:
@@ -120,8 +120,8 @@ def apply_stride_edits(strides: Strides, edits: Iterable[Edit]) -> Strides:
         if edit.kind.endswith("stride"):
             i = find_stride(listed, edit.side, edit.time_s)
             if i is not None:
-                why = None if edit.reason is None else f"{SOURCE}:{edit.reason.strip()}"
-                listed[i] = replace(listed[i], excluded_reason=why)
+                exclusion = None if edit.reason is None else f"{SOURCE}:{edit.reason.strip()}"
+                listed[i] = replace(listed[i], excluded_reason=exclusion)
     return replace(strides, strides=tuple(listed))
 
 
@@ -130,8 +130,8 @@ def find_stride(strides: Sequence[Stride], side: Side, time_s: float) -> int | N
     return next((i for i, s in enumerate(strides) if s.side == side and s.start_s <= time_s < s.end_s), None)
 
 
-def _place(found: Sequence[GaitEvent], edit: Edit) -> int:
-    for i, e in enumerate(found):
+def _place(contacts: Sequence[GaitEvent], edit: Edit) -> int:
+    for i, e in enumerate(contacts):
         if e.side == edit.side and e.kind == edit.event and abs(e.time_s - edit.time_s) <= SAME_S:
             return i
     raise ParameterError(
@@ -158,8 +158,8 @@ def _refuse_outside(time_s: float, duration_s: float) -> None:
         )
 
 
-def _put(found: list[GaitEvent], edit: Edit, time_s: float) -> None:
-    near = next((e for e in found if e.side == edit.side and abs(e.time_s - time_s) < APART_S), None)
+def _put(contacts: list[GaitEvent], edit: Edit, time_s: float) -> None:
+    near = next((e for e in contacts if e.side == edit.side and abs(e.time_s - time_s) < APART_S), None)
     if near is not None:
         raise ParameterError(
             "event_order",
@@ -173,12 +173,12 @@ def _put(found: list[GaitEvent], edit: Edit, time_s: float) -> None:
             ),
             t_s=time_s,
         )
-    found.append(GaitEvent(time_s, edit.side, cast("EventKind", edit.event), SOURCE, time_s))
+    contacts.append(GaitEvent(time_s, edit.side, cast("EventKind", edit.event), SOURCE, time_s))
 
 
-def _refuse_passing(found: Iterable[GaitEvent], edit: Edit, from_s: float, to_s: float) -> None:
+def _refuse_passing(contacts: Iterable[GaitEvent], edit: Edit, from_s: float, to_s: float) -> None:
     low, high = sorted((from_s, to_s))
-    passed = next((e for e in found if e.side == edit.side and low <= e.time_s <= high), None)
+    passed = next((e for e in contacts if e.side == edit.side and low <= e.time_s <= high), None)
     if passed is not None:
         raise ParameterError(
             "event_order",
@@ -195,5 +195,5 @@ def _name(edit: Edit) -> str:
     return f"{edit.side} {'initial contact' if edit.event == 'ic' else 'foot-off'}"
 
 
-def _bad(what: str) -> ParameterError:
-    return ParameterError("bad_edit", Message("This edit is not as expected: {what}.", what=what))
+def _bad(problem: str) -> ParameterError:
+    return ParameterError("bad_edit", Message("This edit is not as expected: {what}.", what=problem))

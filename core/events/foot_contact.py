@@ -153,7 +153,9 @@ class FootContactState:
         )
 
         params = params or FootContactParams()
-        samples = {name: max(1, round(getattr(params, of) * rate_hz)) for name, of in WINDOWS.items()}
+        samples = {
+            name: max(1, round(getattr(params, parameter) * rate_hz)) for name, parameter in WINDOWS.items()
+        }
         same = {"rate_hz": rate_hz, **asdict(params), **samples}
         rule = [same[name] for name in ContactRule._fields]
         size = 2 + sum(samples[name] for name in ("longest", "leaving", "quiet", "apart"))

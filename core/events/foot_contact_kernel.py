@@ -78,11 +78,11 @@ def _read_rule(x):  # type: ignore[no-untyped-def]
 
 
 @inner_njit()
-def _tell(found_int, found_float, total, kind, number, known, last, at, sd):  # type: ignore[no-untyped-def]
+def _tell(found_int, found_float, total, kind, number, detection, last, sample, sd):  # type: ignore[no-untyped-def]
     """Write one report; returns the number of reports."""
     found_int[total, 0], found_int[total, 1] = kind, number
-    found_int[total, 2], found_int[total, 3] = known, last
-    found_float[total, 0], found_float[total, 1] = at, sd
+    found_int[total, 2], found_int[total, 3] = detection, last
+    found_float[total, 0], found_float[total, 1] = sample, sd
     return total + 1
 
 
@@ -115,26 +115,26 @@ def _walks_on(counters, sums, rule):  # type: ignore[no-untyped-def]
 
 
 @inner_njit()
-def _tell_held(found_int, found_float, total, counters, sums, k, wanted):  # type: ignore[no-untyped-def]
-    """Report the unreported ones of the last `wanted` swings without pitch; returns the number of reports."""
-    for n in range(counters[LOOSE] - min(wanted, counters[UNTOLD]), counters[LOOSE]):
+def _tell_held(found_int, found_float, total, counters, sums, k, limit):  # type: ignore[no-untyped-def]
+    """Report the unreported ones of the last `limit` swings without pitch; returns the number of reports."""
+    for n in range(counters[LOOSE] - min(limit, counters[UNTOLD]), counters[LOOSE]):
         for kind, place in ((TC, LOOSE_AT + 4 * n), (IC, LOOSE_AT + 4 * n + 2)):
-            at, sd, number = sums[place], sums[place + 1], counters[NUMBER]
-            total = _tell(found_int, found_float, total, kind, number, k, YES, at, sd)
+            sample, sd, number = sums[place], sums[place + 1], counters[NUMBER]
+            total = _tell(found_int, found_float, total, kind, number, k, YES, sample, sd)
             counters[NUMBER] = number + 1
     counters[HELD], counters[UNTOLD] = NONE, NO
     return total
 
 
 @inner_njit()
-def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule):  # type: ignore[no-untyped-def]
-    """Report the last foot-off again if a contact at `at` is too close; returns the number of reports.
+def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, contact, rule):  # type: ignore[no-untyped-def]
+    """Report the last foot-off again if the contact at `contact` is too close; returns the number of reports.
 
     No swing is that short: the lowest pitch was that of the landing, the foot left the floor when its
     movement began.
     """
     start, left = counters[START], sums[LEFT_AT]
-    if at - left >= rule.least or start < reach or start >= left:
+    if contact - left >= rule.least or start < reach or start >= left:
         return total
     middle = start + (int(left) - start) // 2
     _, off, sd = guess_leaving(pitch, start, middle, reach, rule)
@@ -142,9 +142,9 @@ def _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach
 
 
 @inner_njit()
-def _begin_movement(counters, sums, k, told):  # type: ignore[no-untyped-def]
+def _begin_movement(counters, sums, k, is_reported):  # type: ignore[no-untyped-def]
     """Start a movement of the foot at sample k."""
-    counters[START], counters[TOP], counters[TOLD] = k, k, told
+    counters[START], counters[TOP], counters[TOLD] = k, k, is_reported
     sums[:OFFSET] = 0.0
 
 
@@ -191,13 +191,13 @@ def _close_contact(  # type: ignore[no-untyped-def]
     of reports.
     """
     top, first = counters[OPEN_TOP], max(reach, counters[BOTTOM])
-    at, sd = refine_landing(pitch, acc, top, first, measured, moves, rule.rate_hz, rule)
-    if at != at:
-        at = top + sums[OFFSET] + rule.lead_s * rule.rate_hz
+    sample, sd = refine_landing(pitch, acc, top, first, measured, moves, rule.rate_hz, rule)
+    if sample != sample:
+        sample = top + sums[OFFSET] + rule.lead_s * rule.rate_hz
     if moves:
-        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, sample, rule)
     number = counters[OPEN_NUMBER]
-    total = _tell(found_int, found_float, total, IC, number, k, YES, at, sd)
+    total = _tell(found_int, found_float, total, IC, number, k, YES, sample, sd)
     counters[OPEN_TOP] = -1
     # the foot is on the floor: what moves from here on is another movement
     _begin_movement(counters, sums, k, NO)
@@ -219,15 +219,15 @@ def _take_extreme(  # type: ignore[no-untyped-def]
     number = counters[NUMBER]
     counters[NUMBER] = number + 1
     if kind == TC:
-        at, sd = refine_leaving(pitch, index, reach, rule.rate_hz, rule)
-        if at != at:
-            at = index + offset - rule.lag_s * rule.rate_hz
-        counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index, number, at
-        return _tell(found_int, found_float, total, TC, number, k, YES, at, sd)
-    at = index + offset + rule.lead_s * rule.rate_hz
+        sample, sd = refine_leaving(pitch, index, reach, rule.rate_hz, rule)
+        if sample != sample:
+            sample = index + offset - rule.lag_s * rule.rate_hz
+        counters[BOTTOM], counters[LEFT], sums[LEFT_AT] = index, number, sample
+        return _tell(found_int, found_float, total, TC, number, k, YES, sample, sd)
+    sample = index + offset + rule.lead_s * rule.rate_hz
     counters[OPEN_TOP], counters[OPEN_KNOWN], counters[OPEN_NUMBER] = index, k, number
     sums[OFFSET] = offset
-    return _tell(found_int, found_float, total, IC, number, k, NO, at, rule.late_sd_s)
+    return _tell(found_int, found_float, total, IC, number, k, NO, sample, rule.late_sd_s)
 
 
 @inner_njit()
@@ -241,14 +241,14 @@ def _find_swing(  # type: ignore[no-untyped-def]
     """
     if top < 0:
         top = highest(pitch, first + (end - first) // 2, end)
-    at, sd = refine_landing(pitch, acc, top, first, k, moves, rule.rate_hz, rule)
+    sample, sd = refine_landing(pitch, acc, top, first, k, moves, rule.rate_hz, rule)
     sd = max(sd, rule.loose_sd_s)
     if swinging:
-        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, at, rule)
-        total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, at, sd)
+        total = _mend_leaving(found_int, found_float, total, pitch, counters, sums, k, reach, sample, rule)
+        total = _tell(found_int, found_float, total, IC, counters[NUMBER], k, YES, sample, sd)
         counters[NUMBER] += 1
         return total
-    _hold(counters, sums, k, off, off_sd, at, sd)
+    _hold(counters, sums, k, off, off_sd, sample, sd)
     if _walks_on(counters, sums, rule):
         total = _tell_held(found_int, found_float, total, counters, sums, k, RHYTHM)
         counters[PITCHED] = k
@@ -274,7 +274,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
     """
     rule, size = _read_rule(rules), pitch.shape[0]
     rate_hz = rule.rate_hz
-    kind, index, known = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
+    kind, index, detections = np.empty(2, np.int64), np.empty(2, np.int64), np.empty(2, np.int64)
     offset, s = np.empty(2), np.empty(1)
     total = np.int64(0)
     for i in range(q.shape[0]):
@@ -296,7 +296,7 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             )
         n = foot_pitch_kernel(
             s, valid[i : i + 1], pitch_ring, pitch_counters, pitch_held,
-            window, need, threshold, fall, kind, index, known, offset,
+            window, need, threshold, fall, kind, index, detections, offset,
         )  # fmt: skip
         if not valid[i]:
             counters[MEASURED], counters[RESTING], counters[MOVING], counters[BOTTOM] = 0, 0, 0, NONE
@@ -328,17 +328,17 @@ def foot_contact_kernel(  # type: ignore[no-untyped-def]
             counters[TOP] = k
         swinging, stopped = pitch_counters[2] == 1, counters[RESTING] >= rule.quiet
         start, end, top = counters[START], k - rule.quiet + 1, -1
-        alone = not swinging and counters[TOLD] == 0 and counters[OPEN_TOP] < 0 and start >= reach
+        is_first = not swinging and counters[TOLD] == 0 and counters[OPEN_TOP] < 0 and start >= reach
         if stopped:
             counters[MOVING] = 0
-        elif alone and _lands_between(pitch, counters, k, rate_hz, rule):
+        elif is_first and _lands_between(pitch, counters, k, rate_hz, rule):
             end, top = k, counters[TOP]
         else:
             continue
         first, off, off_sd = start, 0.0, 0.0
         if swinging:
             first = max(reach, counters[BOTTOM])
-        elif not alone or not _leads_far(sums, k - start + 1, end, start, rate_hz, rule):
+        elif not is_first or not _leads_far(sums, k - start + 1, end, start, rate_hz, rule):
             continue
         else:
             middle = top if top >= 0 else start + (end - start) // 2

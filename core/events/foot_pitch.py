@@ -5,10 +5,9 @@ heading and of Euler angles. The foot leaves the floor at a minimum of s below â
 maximum. Source: Nazarahari thesis ch. 6, Algorithm 1, with the departures of docs/science/events.md,
 "Departures from the thesis" (times in seconds, both the time of the extremum and the time of detection).
 
-The distance between the maximum and the true contact depends on how a person lands, not on the rule: with a
-foot that pitches up until it touches the floor it is within a few ms, otherwise early by up to 0.1 s
-(docs/science/events.md, "What the extrema mean"). An initial contact before the first terminal contact is not
-reported, by design.
+The interval between the maximum and the true contact depends on the landing pattern: with a foot that pitches
+up until it touches the floor it is within a few ms, otherwise early by up to 0.1 s (docs/science/events.md,
+section on the extrema). An initial contact before the first terminal contact is not reported, by design.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def advance_foot_pitch(
     sub-sample offset from a parabola through three samples, within Â±0.5.
     """
     room = 2 * (len(s) // (state.window + 1) + 1)
-    kind, index, known = (np.empty(room, np.int64) for _ in range(3))
+    kind, index, detections = (np.empty(room, np.int64) for _ in range(3))
     offset = np.empty(room)
     # numba is slow to import and only needed here
     from sagittal.core.events.foot_pitch_kernel import foot_pitch_kernel
@@ -114,9 +113,9 @@ def advance_foot_pitch(
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
     m = foot_pitch_kernel(
         np.array(s, np.float64), np.array(valid, np.bool_), state.ring, state.counters, state.held,
-        state.window, state.need, state.threshold, state.fall, kind, index, known, offset,
+        state.window, state.need, state.threshold, state.fall, kind, index, detections, offset,
     )  # fmt: skip
-    return kind[:m], index[:m], known[:m], offset[:m]
+    return kind[:m], index[:m], detections[:m], offset[:m]
 
 
 def pitch_signal(q_foot: Floats) -> Floats:

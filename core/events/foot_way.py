@@ -1,9 +1,9 @@
-"""Swings of a foot by the way they lead: for feet that hardly pitch, turn or rest for long.
+"""Swings of a foot by its displacement: for feet with little pitch, little rotation or short rests.
 
-A foot that is drawn along the floor, or carried flat, shows no push-off and no slap, and may turn no faster
-in the air than another one does on the floor. Yet it goes somewhere. Whatever lies between two rests is a
-swing by the distance it covers; its contacts are where the speed along that distance rises and falls.
-docs/science/events.md, "Swings by their way". One kernel runs over a file and over a stream.
+A foot that is dragged along the floor, or carried flat, shows no push-off and no foot slap, and may rotate no
+faster in swing than another foot in stance. It is still displaced. A movement between two rests is a swing if
+it covers enough distance; foot-off and contact are where the speed along that distance rises and falls.
+docs/science/events.md, "Swings by their way". Files and streams use the same kernel.
 """
 
 from __future__ import annotations
@@ -22,34 +22,34 @@ from sagittal.core.frames import Bools, Floats
 
 @dataclass(frozen=True)
 class FootWayParams:
-    """Parameters of swings by their way: our choice where nothing is said.
+    """Parameters of swings by displacement; values without a cited source were chosen by the authors.
 
-    Chosen on nine simulated impaired walks at 100 Hz, `last_share` at 50 and 60 Hz, too; ipol_walks was
-    watched. Other seeds, sizes and rates are in validation/accuracy/test_events_impaired.py.
+    Chosen on nine simulated impaired walks at 100 Hz, `last_share` also at 50 and 60 Hz; ipol_walks served as
+    a check. Other seeds, sizes and rates are in validation/accuracy/test_events_impaired.py.
 
     Parameters
     ----------
-    chord_s : the rate of turning is that of the whole turn over so long.
-    floor_rad_s, ceiling_rad_s : a foot rests below the person's own level, the split (Otsu) of the logarithm
-        of its rates of turning, kept within these. moved_rad_s, lately_s : rates count where the foot turned
-        so fast in the last so many seconds: a long standing must not shift the split.
-    hold_s, calm_mps2 : turning so slowly for so long, pushed or slowed down by less than this, it rests. A
-        foot that is carried evenly turns no more than one that rests, but is slowed down before it lands.
-    tilt_mps2 : most that a wrong attitude leaves of gravity at rest, about 3°; it is taken off.
-    long_s : a movement that led nowhere goes on in the next unless the foot rests for so long: a heel rises
-        and is held before the foot swings.
+    chord_s : duration over which the angular rate is averaged.
+    floor_rad_s, ceiling_rad_s : limits of the person's rest level, the split (Otsu) of the logarithm of the
+        angular rates; a foot rests below it. moved_rad_s, lately_s : rates are counted only if the foot
+        exceeded `moved_rad_s` within the last `lately_s`, so that long standing does not shift the split.
+    hold_s, calm_mps2 : a foot rests after `hold_s` below the level with an acceleration below `calm_mps2`. A
+        foot carried evenly rotates no more than a resting one, but decelerates before it lands.
+    tilt_mps2 : largest residual of gravity at rest due to attitude errors, about 3°; it is subtracted.
+    long_s : a movement without displacement is merged with the next unless the foot rests this long: a heel
+        rises and is held before the foot swings.
     shortest_s, longest_s : of a movement.
-    least_m, share : a swing leads at least so far, and this share of the person's typical way.
-    edge_off, edge_on : foot-off and contact are where the speed along the way passes this share of its peak.
+    least_m, share : smallest displacement of a swing, absolute and as a share of the person's typical one.
+    edge_off, edge_on : shares of the peak speed along the path that define foot-off and contact.
     leaving_share, push_s, leaving_s, dip_rad : foot-off by a push-off as in `FootContactParams`, of one
         that turns the foot by `least_rad_s` or more and ends within `near_push_s` of the other.
-    landing_s, last_share, contact_share, near_s, knock_s, least_knock : contact by knocks: of those from half
-        the speed to `landing_s` after `edge_on` the last that has `last_share` of the hardest, from its first
-        `contact_share` within `near_s` on. A knock is the change of force over `knock_s`; below
-        `least_knock`, m/s², there is none.
+    landing_s, last_share, contact_share, near_s, knock_s, least_knock : contact by impacts: among those
+        between half the speed and `landing_s` after `edge_on`, the last with `last_share` of the largest,
+        from its first `contact_share` within `near_s` on. An impact is the change of force over `knock_s`;
+        those below `least_knock`, m/s², are ignored.
     sd_s : standard uncertainty of a contact, half of that of a foot-off without a push. leaving_sd_s : of
         a push-off, as in `FootContactParams`.
-    learn_s : how often a stream learns the own level anew, seconds of walking.
+    learn_s : interval at which a stream updates the rest level, seconds of walking.
     """
 
     chord_s: float = 0.1
@@ -99,14 +99,14 @@ _SHORTEST: Final = 24
 
 @dataclass(eq=False)
 class FootWayState:
-    """What is remembered between two blocks of one foot.
+    """State of one foot between two blocks.
 
     Parameters
     ----------
     rule : the parameters in the order of the kernel's. turns (m, 4), track (m, 3), acc (m, 3),
-        course (m, 2) : orientations, what is derived of them, forces and velocities of the last seconds.
-    counters, sums : places named in way_kernel.py. counts : rates of turning so far, by bins.
-    learns : whether the own level is still learned.
+        course (m, 2) : orientations, derived quantities, forces and velocities of the last seconds.
+    counters, sums : indices named in way_kernel.py. counts : histogram of the angular rates so far.
+    learns : whether the rest level is still being learned.
     """
 
     rule: Floats
@@ -138,7 +138,8 @@ class FootWayState:
 
         params = params or FootWayParams()
         samples = {
-            name: max(1, int(np.ceil(getattr(params, of) * rate_hz - 1e-9))) for name, of in WINDOWS.items()
+            name: max(1, int(np.ceil(getattr(params, parameter) * rate_hz - 1e-9)))
+            for name, parameter in WINDOWS.items()
         }
         # a push-off that is not clear is told by the speed
         same = {"rate_hz": rate_hz, "late_sd_s": params.sd_s, **asdict(params), **samples}

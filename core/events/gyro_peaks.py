@@ -3,7 +3,7 @@
 Every swing is a peak of the rate (forward positive). After it the segment slows down, its rate crosses zero
 and has a negative peak: one of the two is the initial contact. Before it, during heel rise, the rate has its
 deepest minimum: the terminal contact. The published detectors differ in segment, feature, waiting times and
-threshold. Their full rules are not openly available; the presets combine what is published
+threshold. Their full rules are not openly available; the presets combine the published parts
 (docs/science/events.md, "Presets") and are called reconstructions: their results are not those of the papers.
 """
 
@@ -153,9 +153,9 @@ def gyro_peak_events(take: Oriented, rate_hz: float, params: GyroPeakParams | No
         if unclear:
             notices.append(_say_unclear(side, segment, unclear, params))
             continue
-        found = _events(side, rate, take.valid[segment], take.t_s, rate_hz, params)
-        events += found
-        if not found:
+        contacts = _events(side, rate, take.valid[segment], take.t_s, rate_hz, params)
+        events += contacts
+        if not contacts:
             top = float(np.degrees(rate[take.valid[segment]].max(initial=0.0)))
             notices.append(
                 Notice(
@@ -204,8 +204,8 @@ def _events(
             events.append(GaitEvent(time, side, "tc", params.name, float(t_s[swing])))
         contact = _contact(course, swing, min(following, swing + reach), rate_hz, params)
         if contact is not None and course.is_valid(swing, contact[1]):
-            at, known_at = contact
-            events.append(GaitEvent(begin_s + at * step, side, "ic", params.name, float(t_s[known_at])))
+            sample, known_at = contact
+            events.append(GaitEvent(begin_s + sample * step, side, "ic", params.name, float(t_s[known_at])))
             landed = known_at
     return events
 
@@ -231,13 +231,13 @@ class _Course:
 
     def find_below(self, start: int, end: int) -> int | None:
         """The first sample from `start` on, before `end`, without forward rotation of the segment."""
-        at = bisect_left(self._below, start)
-        return self._below[at] if at < len(self._below) and self._below[at] < end else None
+        position = bisect_left(self._below, start)
+        return self._below[position] if position < len(self._below) and self._below[position] < end else None
 
     def is_valid(self, first: int, last: int) -> bool:
         """Whether no sample is lost, both ends included."""
-        at = bisect_left(self._lost, first)
-        return at == len(self._lost) or self._lost[at] > last
+        position = bisect_left(self._lost, first)
+        return position == len(self._lost) or self._lost[position] > last
 
     def find_deepest(self, samples: list[int]) -> int:
         """The lowest of some samples, the first if equal."""
@@ -248,12 +248,12 @@ def _contact(
     course: _Course, swing: int, end: int, rate_hz: float, params: GyroPeakParams
 ) -> tuple[float, int] | None:
     """Sample (fractional) of the contact after a swing, and the sample of its detection."""
-    rate, after = course.rate, course.find_below(swing, end)
-    if after is None:
+    rate, crossing = course.rate, course.find_below(swing, end)
+    if crossing is None:
         return None
     if params.contact == "zero_cross":
-        return after - float(rate[after] / (rate[after] - rate[after - 1])), after
-    lows = course.find_lows(after, min(end, after + round(params.contact_s * rate_hz) + 1))
+        return crossing - float(rate[crossing] / (rate[crossing] - rate[crossing - 1])), crossing
+    lows = course.find_lows(crossing, min(end, crossing + round(params.contact_s * rate_hz) + 1))
     if not lows:
         return None
     low = course.find_deepest(lows)
@@ -267,35 +267,35 @@ def _unclear(rate: Floats, rate_hz: float, params: GyroPeakParams) -> tuple[int,
     # a swing may have a smaller peak beside its own: only what stands for itself counts
     distance = max(1.0, params.apart_s * rate_hz)
     peaks = find_peaks(rate, height=low, prominence=low, distance=distance)
-    above = int((rate[peaks] >= params.swing_rad_s).sum())
-    below = len(peaks) - above
-    return (below, above) if above and below > most * above else None
+    high_count = int((rate[peaks] >= params.swing_rad_s).sum())
+    low_count = len(peaks) - high_count
+    return (low_count, high_count) if high_count and low_count > most * high_count else None
 
 
-def _say_unclear(side: Side, segment: Segment, found: tuple[int, int], params: GyroPeakParams) -> Notice:
+def _say_unclear(side: Side, segment: Segment, counts: tuple[int, int], params: GyroPeakParams) -> Notice:
     limit = f"{np.degrees(params.swing_rad_s):.0f}"
     return Notice(
         "swing_unclear",
         plural(
-            found[0],
+            counts[0],
             Message(
                 "{found} swing of the {side} {segment} stays just below {limit}°/s and {found2} "
                 "exceed it: {name} would miss many contacts, so it reports none.",
-                found=found[0],
+                found=counts[0],
                 side=side,
                 segment=params.segment,
                 limit=limit,
-                found2=found[1],
+                found2=counts[1],
                 name=params.name,
             ),
             Message(
                 "{found} swings of the {side} {segment} stay just below {limit}°/s and {found2} "
                 "exceed it: {name} would miss many contacts, so it reports none.",
-                found=found[0],
+                found=counts[0],
                 side=side,
                 segment=params.segment,
                 limit=limit,
-                found2=found[1],
+                found2=counts[1],
                 name=params.name,
             ),
         ),
@@ -318,6 +318,6 @@ def _minima(x: Floats) -> np.ndarray:
 
 def _vertex(x: Floats, i: int) -> float:
     """Sub-sample offset of the extremum at i, within ±0.5: a parabola through three samples."""
-    before, at, after = x[i - 1 : i + 2].tolist()
-    bend = before - 2.0 * at + after
-    return 0.0 if bend == 0.0 else float(min(max(0.5 * (before - after) / bend, -0.5), 0.5))
+    previous_value, value, next_value = x[i - 1 : i + 2].tolist()
+    bend = previous_value - 2.0 * value + next_value
+    return 0.0 if bend == 0.0 else float(min(max(0.5 * (previous_value - next_value) / bend, -0.5), 0.5))

@@ -59,7 +59,7 @@ class ContactDetector:
         q : (T, feet, 4) foot to W. valid : (T, feet). motions : of each foot over the same samples. first :
             first sample of the chain on the axis.
         """
-        found = []
+        contacts = []
         for i, foot in enumerate(self._feet):
-            found += foot.push(q[:, i], valid[:, i], motions[i], first)
-        return sorted(found, key=lambda x: (x.at, x.event.side))
+            contacts += foot.push(q[:, i], valid[:, i], motions[i], first)
+        return sorted(contacts, key=lambda x: (x.at, x.event.side))

@@ -20,10 +20,10 @@ JUDGED: Final = 5
 
 
 class KnownContact(NamedTuple):
-    """A contact and the sample, counted from the start of the chain, at which it is told.
+    """A contact and the sample, counted from the start of the chain, at which it is reported.
 
-    Not `final`: its refined time is still to come. Then it is told again, its `first_s` the time it had. So
-    is a foot-off, though final, that the contact after it shows to have been the landing.
+    Not `final`: a refined time follows. The contact is then reported again, with its first time as `first_s`.
+    A final foot-off is also reported again if the following contact shows that it was the landing.
     """
 
     at: int
@@ -32,11 +32,12 @@ class KnownContact(NamedTuple):
 
 
 class LiveFoot:
-    """One foot; any division of its samples into blocks tells the same.
+    """Contacts of one streamed foot, independent of the division of its samples into blocks.
 
-    Both finders run. A file chooses between them for a whole take (choice.py), a stream by the last swings:
-    where their contacts by way have none by pitch beside them, those are told from then on, the last
-    `JUDGED` in arrears. What the pitch told before stays told.
+    Both detectors run. A file chooses between them for a whole trial (choice.py), a stream by the last
+    swings: if their contacts by displacement have no contacts by pitch close in time, the former are
+    reported from then on, including those of the last `JUDGED` swings. Contacts by pitch reported earlier are
+    not withdrawn.
     """
 
     def __init__(
@@ -69,33 +70,35 @@ class LiveFoot:
         pitch = advance_foot_contacts(self._pitch, q, valid, motion.speed, motion.acc)
         way = advance_foot_ways(self._way, q, valid, motion.acc)
         # the contact by pitch of the same sample is known before that by way
-        told = [
-            (known, 0, final, event)
-            for known, final, event in read_reports(pitch, self.side, start_s, self._rate_hz, self._latest)
+        reports = [
+            (detection, 0, final, event)
+            for detection, final, event in read_reports(
+                pitch, self.side, start_s, self._rate_hz, self._latest
+            )
         ]
-        told += [
-            (known, 1, final, event)
-            for known, final, event in read_reports(way, self.side, start_s, self._rate_hz, self._by_way)
+        reports += [
+            (detection, 1, final, event)
+            for detection, final, event in read_reports(way, self.side, start_s, self._rate_hz, self._by_way)
         ]
-        found: list[KnownContact] = []
-        for known, by_way, final, event in sorted(told, key=lambda x: x[:2]):
+        contacts: list[KnownContact] = []
+        for detection, by_way, final, event in sorted(reports, key=lambda x: x[:2]):
             if by_way:
-                found += self._take_way(known, event)
+                contacts += self._take_way(detection, event)
             else:
-                found += self._take_pitch(known, final, event)
-        for kept in (self._latest, self._by_way):
-            for number in list(kept)[:-REMEMBERED]:
-                del kept[number]
-        return found
+                contacts += self._take_pitch(detection, final, event)
+        for store in (self._latest, self._by_way):
+            for number in list(store)[:-REMEMBERED]:
+                del store[number]
+        return contacts
 
-    def _take_pitch(self, known: int, final: bool, event: GaitEvent) -> list[KnownContact]:
+    def _take_pitch(self, detection: int, final: bool, event: GaitEvent) -> list[KnownContact]:
         if event.kind == "ic":
             self._landed[event.time_s if event.first_s is None else event.first_s] = event.time_s
             for moment in list(self._landed)[: -2 * JUDGED]:
                 del self._landed[moment]
-        return [] if self._believed else [KnownContact(known, event, final)]
+        return [] if self._believed else [KnownContact(detection, event, final)]
 
-    def _take_way(self, known: int, event: GaitEvent) -> list[KnownContact]:
+    def _take_way(self, detection: int, event: GaitEvent) -> list[KnownContact]:
         """A foot-off and the contact after it come together, the foot-off first."""
         if event.kind == "tc":
             self._leaving = event
@@ -104,8 +107,8 @@ class LiveFoot:
         self._untold = min(self._untold + 1, JUDGED)
         landings = [on.time_s for _, on in self._swings]
         since = landings[0] - 0.5 * (landings[-1] - landings[0]) / max(1, len(landings) - 1)
-        beside = [t for t in self._landed.values() if since <= t <= landings[-1] + 0.5]
-        believed = believes_way([(off.time_s, on.time_s) for off, on in self._swings], beside)
+        pitch_contacts = [t for t in self._landed.values() if since <= t <= landings[-1] + 0.5]
+        believed = believes_way([(off.time_s, on.time_s) for off, on in self._swings], pitch_contacts)
         if not believed and len(landings) < LEAST:
             return []
         self._believed = believed
@@ -115,8 +118,8 @@ class LiveFoot:
         late = self._swings[len(self._swings) - self._untold :]
         self._untold = 0
         return [
-            KnownContact(known, x, True)
+            KnownContact(detection, x, True)
             for off, on in late
-            if not count_seen([on.time_s], beside)
+            if not count_seen([on.time_s], pitch_contacts)
             for x in (off, on)
         ]

@@ -124,10 +124,10 @@ def detect_steps(recording: UniformRecording, params: LumbarParams | None = None
     segment = trunk_sensor(recording)
     if segment is None:
         raise SignalError("no_trunk_sensor", "Trunk steps require a sensor on the pelvis or chest.")
-    found = _find_rows(recording, segment, params)
-    if isinstance(found, Steps):
-        return found
-    times, rhythm, yaw_rate = found
+    detection = _find_rows(recording, segment, params)
+    if isinstance(detection, Steps):
+        return detection
+    times, rhythm, yaw_rate = detection
     rests = find_rest_windows(recording, segments=(segment,))
     standing = find_rest_windows(recording, STANDING, (segment,))
     bouts = tuple(
@@ -189,10 +189,10 @@ def find_step_times(recording: UniformRecording, segment: Segment, params: StepT
     ------
     SignalError : `sample_rate_too_low`.
     """
-    found = _find_rows(recording, segment, params)
-    if isinstance(found, Steps):
+    detection = _find_rows(recording, segment, params)
+    if isinstance(detection, Steps):
         return []
-    times, rhythm, _ = found
+    times, rhythm, _ = detection
     bouts = [b for b in plain_bouts(times, params.bouts) if _repeats(b, rhythm, params)]
     return [t for b in bouts for t in times if b.first_s <= t <= b.end_s]
 
@@ -283,8 +283,8 @@ def _steps(
     usual = float(np.median(rhythm.step_s[good]))
     times: list[float] = []
     for first, end in _parts(moving, params.merge_s * rate_hz):
-        here = good & (rhythm.t_s * rate_hz >= first) & (rhythm.t_s * rate_hz <= end)
-        step = float(np.median(rhythm.step_s[here])) if here.any() else usual
+        mask = good & (rhythm.t_s * rate_hz >= first) & (rhythm.t_s * rate_hz <= end)
+        step = float(np.median(rhythm.step_s[mask])) if mask.any() else usual
         reach = round(2.0 * step * rate_hz)
         low = max(0, first - reach)
         smooth = smooth_gaussian(vertical[low : end + reach], params.scale * step * rate_hz)
@@ -298,8 +298,8 @@ def _steps(
 def _repeats(bout: Bout, rhythm: Periodicity, params: StepTimeParams) -> bool:
     """Whether a bout is sufficiently periodic."""
     reach = 0.5 * params.periodicity.hop_s
-    here = (rhythm.t_s >= bout.start_s - reach) & (rhythm.t_s <= bout.end_s + reach)
-    return bool(here.any() and rhythm.score[here].mean() >= params.bout_score)
+    mask = (rhythm.t_s >= bout.start_s - reach) & (rhythm.t_s <= bout.end_s + reach)
+    return bool(mask.any() and rhythm.score[mask].mean() >= params.bout_score)
 
 
 def _parts(moving: Bools, merge: float) -> list[tuple[int, int]]:
@@ -321,14 +321,14 @@ def _offset(x: Floats, i: int) -> float:
 
 def _together(times: list[float], longest: float, least: int) -> list[float]:
     """Times in a row of at least `least`, with gaps of at most `longest`."""
-    kept: list[float] = []
+    steady_times: list[float] = []
     row: list[float] = []
     for t in times:
         if row and t - row[-1] > longest:
-            kept += row if len(row) >= least else []
+            steady_times += row if len(row) >= least else []
             row = []
         row.append(t)
-    return kept + (row if len(row) >= least else [])
+    return steady_times + (row if len(row) >= least else [])
 
 
 def _unbroken(times: list[float], bout: Bout) -> list[list[float]]:
@@ -359,20 +359,20 @@ def _sides(
     stride = max(3, round(2.0 * step_s * rate_hz))
     swing = yaw - uniform_filter1d(uniform_filter1d(yaw, stride, mode="nearest"), stride, mode="nearest")
     n = len(times)
-    at = swing[[min(len(swing) - 1, round((t + 0.25 * step_s) * rate_hz)) for t in times]]
+    yaw_at_step = swing[[min(len(swing) - 1, round((t + 0.25 * step_s) * rate_hz)) for t in times]]
     turning = np.abs(low_pass(yaw_rate, 0.5, rate_hz)) >= params.turning_rad_s
     straight = ~turning[[min(len(swing) - 1, round(t * rate_hz)) for t in times]]
     # where a maximum was missed, two steps went by
     gone = np.maximum(1, np.round(np.diff(times) / step_s)).astype(int)
     parity = (-1.0) ** np.concatenate(([0], np.cumsum(gone)))
-    agreement = float((at * parity).sum() / max(np.abs(at).sum(), 1e-12))
+    agreement = float((yaw_at_step * parity).sum() / max(np.abs(yaw_at_step).sum(), 1e-12))
     if n >= params.side_steps and abs(agreement) >= params.side_share:
         return ["right" if p * agreement > 0.0 else "left" for p in parity]
     right = np.zeros(n)
     parts = [(a, b) for a, b in find_runs(straight) if b - a >= params.side_steps]
     for a, b in parts:
-        total = float((at[a:b] * parity[a:b]).sum())
-        share = abs(total) / max(float(np.abs(at[a:b]).sum()), 1e-12)
+        total = float((yaw_at_step[a:b] * parity[a:b]).sum())
+        share = abs(total) / max(float(np.abs(yaw_at_step[a:b]).sum()), 1e-12)
         if share >= params.side_share and abs(total) >= params.side_rad * (b - a):
             low = 0 if a <= params.side_reach else a
             high = n if n - b <= params.side_reach else b

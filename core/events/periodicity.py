@@ -118,9 +118,9 @@ def step_times(
         part = slice(first, first + TOGETHER)
         scores = _score_lags(a[:, part], w[:, part], lag, turns=gyr is not None)
         best = _choose(scores, params.nearly)
-        found = best >= 0
-        step_s[part][found] = lag[best[found]] / rate_hz
-        score[part][found] = scores[found, best[found]]
+        is_periodic = best >= 0
+        step_s[part][is_periodic] = lag[best[is_periodic]] / rate_hz
+        score[part][is_periodic] = scores[is_periodic, best[is_periodic]]
     middles = (hop * np.arange(len(score)) + 0.5 * width) / rate_hz
     return Periodicity(np.asarray(middles), step_s, score)
 

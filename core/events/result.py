@@ -90,10 +90,10 @@ class GaitEvents:
     @property
     def contact_uncertainty_s(self) -> float | None:
         """Standard uncertainty of the median contact, manual events excluded; None if unknown."""
-        known = sorted(
+        uncertainties = sorted(
             e.uncertainty_s for e in self.events if e.uncertainty_s is not None and e.source != MANUAL
         )
-        return known[len(known) // 2] if known else None
+        return uncertainties[len(uncertainties) // 2] if uncertainties else None
 
     def times(self, side: Side, kind: EventKind) -> tuple[float, ...]:
         """Event times in s of one side and kind, strictly increasing: coincident events are merged."""
@@ -101,10 +101,10 @@ class GaitEvents:
 
     @cached_property
     def _times(self) -> Mapping[tuple[Side, EventKind], tuple[float, ...]]:
-        found: dict[tuple[Side, EventKind], list[float]] = {}
+        times_by_key: dict[tuple[Side, EventKind], list[float]] = {}
         for e in self.events:
-            found.setdefault((e.side, e.kind), []).append(e.time_s)
-        return {key: tuple(dict.fromkeys(times)) for key, times in found.items()}
+            times_by_key.setdefault((e.side, e.kind), []).append(e.time_s)
+        return {key: tuple(dict.fromkeys(times)) for key, times in times_by_key.items()}
 
 
 @dataclass(frozen=True)
@@ -193,9 +193,9 @@ class Strides:
             (s.start_s, s.tc_s, s.end_s, s.opposite_tc_s, s.opposite_ic_s, s.turn_rad) for s in self.strides
         ]
         table = np.ascontiguousarray(np.array(rows, np.float64).reshape(-1, 6).T)
-        counted = np.array([s.excluded_reason is None for s in self.strides], np.bool_)
+        is_counted = np.array([s.excluded_reason is None for s in self.strides], np.bool_)
         left = np.array([s.side == "left" for s in self.strides], np.bool_)
-        of = {side: np.flatnonzero(left if side == "left" else ~left) for side in SIDES}
+        rows_by_side = {side: np.flatnonzero(left if side == "left" else ~left) for side in SIDES}
         start_s, tc_s, end_s, opposite_tc_s, opposite_ic_s, turn_rad = table
         return StrideColumns(
             start_s=start_s,
@@ -204,9 +204,9 @@ class Strides:
             opposite_tc_s=opposite_tc_s,
             opposite_ic_s=opposite_ic_s,
             turn_rad=turn_rad,
-            counted=counted,
-            of=of,
-            used={side: own[counted[own]] for side, own in of.items()},
+            counted=is_counted,
+            of=rows_by_side,
+            used={side: own[is_counted[own]] for side, own in rows_by_side.items()},
         )
 
     def select_used(self, side: Side | None = None) -> tuple[Stride, ...]:

@@ -73,7 +73,7 @@ def side_strides(
     params: StrideParams,
 ) -> list[Stride]:
     """Cycles of one foot with every reason independent of neighbours; arguments as in `stride_list`."""
-    other: Side = "right" if side == "left" else "left"
+    opposite: Side = "right" if side == "left" else "left"
     contacts, leavings = np.array(events.times(side, "ic")), np.array(events.times(side, "tc"))
     n = len(orientations.t_s)
     places = np.searchsorted(orientations.t_s, contacts)
@@ -93,20 +93,20 @@ def side_strides(
     in_turn = _total(np.zeros(n, np.bool_) if turning is None else turning)
     start, end = contacts[:-1], contacts[1:]
     tc, left = _inside(leavings, start, end)
-    landed, landings = _inside(np.array(events.times(other, "ic")), start, end)
+    landed, landings = _inside(np.array(events.times(opposite, "ic")), start, end)
     opposite_ic = np.where(landings == 1, landed, np.nan)
     opposite_tc, _ = _inside(
-        np.array(events.times(other, "tc")), start, np.where(landings == 1, opposite_ic, end)
+        np.array(events.times(opposite, "tc")), start, np.where(landings == 1, opposite_ic, end)
     )
     # of a foot that is lost for a while nobody knows which of its contacts is which
-    unknown = is_lost(other)
+    unknown = is_lost(opposite)
     opposite_ic, opposite_tc = (np.where(unknown, np.nan, x) for x in (opposite_ic, opposite_tc))
     gap = is_lost(side)
     turn = np.full(len(start), np.nan)
     if foot in orientations.q:
         heading = yaw(orientations.q[foot][np.minimum(places, n - 1)])
         turn = np.where(gap, np.nan, wrap_angle(np.diff(heading)))
-    found: dict[StrideFlag, Bools] = {
+    masks: dict[StrideFlag, Bools] = {
         "gap": gap,
         "incomplete": (left != 1) | (landings > 1),
         "implausible_time": (end - start < params.min_s) | (end - start > params.max_s),
@@ -114,14 +114,14 @@ def side_strides(
         | (in_turn[past] - in_turn[first] > params.turn_share * (past - first)),
     }
     flags: list[tuple[StrideFlag, ...]] = [()] * len(start)
-    for flag, where in found.items():
-        for i in np.flatnonzero(where).tolist():
+    for flag, mask in masks.items():
+        for i in np.flatnonzero(mask).tolist():
             flags[i] = (*flags[i], flag)
-    known = (list_known(x) for x in (tc, opposite_tc, opposite_ic, turn))
+    optional_columns = (list_known(x) for x in (tc, opposite_tc, opposite_ic, turn))
     return [
         Stride(side, a, off, b, other_off, other_ic, turned, flags=own)
         for a, b, off, other_off, other_ic, turned, own in zip(
-            start.tolist(), end.tolist(), *known, flags, strict=True
+            start.tolist(), end.tolist(), *optional_columns, flags, strict=True
         )
     ]
 
@@ -131,10 +131,10 @@ def _total(mask: Bools) -> NDArray[np.int64]:
     return np.concatenate(([0], np.cumsum(mask, dtype=np.int64)))
 
 
-def _inside(times: Floats, after: Floats, before: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """First of increasing times in each open range (after, before), NaN without one; and the number in it."""
-    first = np.searchsorted(times, after, "right")
-    count = np.searchsorted(times, before, "left") - first
+def _inside(times: Floats, lower: Floats, upper: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """First of increasing times in each open range (lower, upper), NaN without one; and the number in it."""
+    first = np.searchsorted(times, lower, "right")
+    count = np.searchsorted(times, upper, "left") - first
     return np.where(count > 0, np.append(times, np.nan)[first], np.nan), count
 
 
@@ -142,11 +142,11 @@ def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
     """Notices on too few strides for a comparison, and on counting those next to a turn."""
     left = Counter(s.side for s in strides if s.excluded_reason is None)
     few = [side for side in SIDES if 0 < left[side] < COMPARED]
-    said: list[str] = []
+    sentences: list[str] = []
     if few:
         counts = " and ".join(f"{left[side]} {side}" for side in few)
         word = plural(sum(left[s] for s in few), "stride counts", "strides count")
-        said.append(
+        sentences.append(
             Message(
                 "Only {counts} {word}; at least {COMPARED} per side are needed for a comparison. Walk "
                 "further straight ahead.",
@@ -156,8 +156,8 @@ def _short_walk(strides: Sequence[Stride], near_turns: bool) -> list[Notice]:
             )
         )
     if near_turns:
-        said.append("Because so few remain, strides next to a turn are included.")
-    return [Notice("short_walk", join_messages(*said))] if said else []
+        sentences.append("Because so few remain, strides next to a turn are included.")
+    return [Notice("short_walk", join_messages(*sentences))] if sentences else []
 
 
 def _unused(strides: Sequence[Stride]) -> list[Notice]:
@@ -168,7 +168,7 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
         if own and all(s.excluded_reason for s in own):
             reasons = Counter(s.excluded_reason for s in own)
             words = ", ".join(f"{n} {reason}" for reason, n in reasons.most_common())
-            said = plural(
+            message = plural(
                 len(own),
                 Message(
                     "The only {side} stride is excluded: {words}. Gait initiation, turns and termination are "
@@ -184,5 +184,5 @@ def _unused(strides: Sequence[Stride]) -> list[Notice]:
                     words=words,
                 ),
             )
-            notices.append(Notice("no_strides", said, FOOT[side]))
+            notices.append(Notice("no_strides", message, FOOT[side]))
     return notices

@@ -100,14 +100,14 @@ def find_turns(
         return ()
     smooth = low_pass(yaw_rate, params.cutoff_hz, rate_hz)
     quick = low_pass(yaw_rate, params.peak_cutoff_hz, rate_hz)
-    found: list[tuple[int, int]] = []
+    ranges: list[tuple[int, int]] = []
     for sign in (1.0, -1.0):
         for first, end in _joined(find_runs(sign * smooth > params.edge_rad_s), params.join_s * rate_hz):
             whole = first > 0 and end < len(smooth) and valid[first:end].all()
             if whole and (sign * smooth[first:end]).max() >= params.peak_rad_s:
-                found.append((first, end))
+                ranges.append((first, end))
     listed = []
-    for first, end in sorted(found):
+    for first, end in sorted(ranges):
         start, stop = _half_height(np.abs(smooth[first:end]), params.height)
         listed.append(
             Turn(
@@ -128,17 +128,17 @@ def body_yaw_rate(take: Oriented, rate_hz: float) -> tuple[Floats, Bools]:
     """
     n = len(take.t_s)
     levels = [level for level in LEVELS if all(s in take.q for s in level)]
-    worn = max(levels, key=lambda level: _share(take.valid, level), default=())
-    if not worn:
+    segments = max(levels, key=lambda level: _share(take.valid, level), default=())
+    if not segments:
         return np.zeros(n), np.zeros(n, np.bool_)
-    valid = np.logical_and.reduce([take.valid[s] for s in worn])
-    rate = np.mean([_vertical_rate(take.q[s]) for s in worn], axis=0) * rate_hz
+    valid = np.logical_and.reduce([take.valid[s] for s in segments])
+    rate = np.mean([_vertical_rate(take.q[s]) for s in segments], axis=0) * rate_hz
     return np.asarray(rate), np.asarray(valid)
 
 
-def _share(valid: Mapping[Segment, Bools], worn: tuple[Segment, ...]) -> float:
+def _share(valid: Mapping[Segment, Bools], segments: tuple[Segment, ...]) -> float:
     """Fraction of a recording with data of the sensors, in tenths so that the steadier ones win a tie."""
-    return round(float(np.logical_and.reduce([valid[s] for s in worn]).mean()), 1)
+    return round(float(np.logical_and.reduce([valid[s] for s in segments]).mean()), 1)
 
 
 def _vertical_rate(q: Floats) -> Floats:
@@ -149,14 +149,14 @@ def _vertical_rate(q: Floats) -> Floats:
 
 def _half_height(rate: Floats, height: float) -> tuple[int, int]:
     """Outermost samples above a fraction of the typical rate of a turn, its angle-weighted mean."""
-    above = np.flatnonzero(rate > height * float((rate**2).sum() / rate.sum()))
-    return int(above[0]), int(above[-1]) + 1
+    indices = np.flatnonzero(rate > height * float((rate**2).sum() / rate.sum()))
+    return int(indices[0]), int(indices[-1]) + 1
 
 
-def _joined(found: list[tuple[int, int]], pause: float) -> list[tuple[int, int]]:
+def _joined(ranges: list[tuple[int, int]], pause: float) -> list[tuple[int, int]]:
     """Index ranges, merged if at most `pause` samples apart."""
     joined: list[tuple[int, int]] = []
-    for first, end in found:
+    for first, end in ranges:
         if joined and first - joined[-1][1] <= pause:
             joined[-1] = (joined[-1][0], end)
         else:

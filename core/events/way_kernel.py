@@ -109,22 +109,22 @@ def _chord(q, k, n, rate_hz):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def split_in_two(counts):  # type: ignore[no-untyped-def]
-    """Otsu's threshold of what was counted in the bins, rad/s; 0 where there is only one kind."""
+    """Otsu's threshold of a histogram of angular rates, rad/s; 0 if there is only one class."""
     total, moment = 0.0, 0.0
     for i in range(BINS):
         total += counts[i]
         moment += counts[i] * i
-    best, cut, below, first = 0.0, 0, 0.0, 0.0
+    best, cut, lower_count, first = 0.0, 0, 0.0, 0.0
     for i in range(BINS - 1):
-        below += counts[i]
+        lower_count += counts[i]
         first += counts[i] * i
-        above = total - below
-        if below <= 0.0 or above <= 0.0:
+        upper_count = total - lower_count
+        if lower_count <= 0.0 or upper_count <= 0.0:
             continue
-        apart = (moment - first) / above - first / below
-        between = below * above * apart * apart
-        if between > best:
-            best, cut = between, i
+        apart = (moment - first) / upper_count - first / lower_count
+        class_variance = lower_count * upper_count * apart * apart
+        if class_variance > best:
+            best, cut = class_variance, i
     return LOWEST_RATE * exp((cut + 1) * PER_BIN) if best > 0.0 else 0.0
 
 
@@ -137,7 +137,7 @@ def count_rate(counts, rate):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _set_level(counts, sums, rule):  # type: ignore[no-untyped-def]
-    """The person's own level of rest from what was counted."""
+    """Update the person's rest level from the histogram of angular rates."""
     cut = split_in_two(counts)
     if cut > 0.0:
         sums[LEVEL] = min(max(cut, rule.floor_rad_s), rule.ceiling_rad_s)
@@ -169,13 +169,13 @@ def _follow(track, course, start, end, rule):  # type: ignore[no-untyped-def]
     size = track.shape[0]
     n = end - start
     rate_hz, half = rule.rate_hz, rule.chord // 2
-    ax, ay = _rest_force(track, start - rule.chord, start, rule.tilt_mps2)
-    bx, by = _rest_force(track, end - half, end + half, rule.tilt_mps2)
+    start_x, start_y = _rest_force(track, start - rule.chord, start, rule.tilt_mps2)
+    end_x, end_y = _rest_force(track, end - half, end + half, rule.tilt_mps2)
     vx, vy = 0.0, 0.0
     for j in range(n + 1):
         u, i = j / n, (start + j) % size
-        vx += (track[i, ACC_X] - (1.0 - u) * ax - u * bx) / rate_hz
-        vy += (track[i, ACC_Y] - (1.0 - u) * ay - u * by) / rate_hz
+        vx += (track[i, ACC_X] - (1.0 - u) * start_x - u * end_x) / rate_hz
+        vy += (track[i, ACC_Y] - (1.0 - u) * start_y - u * end_y) / rate_hz
         course[i, 0], course[i, 1] = vx, vy
     x, y = 0.0, 0.0
     for j in range(n + 1):
@@ -194,10 +194,10 @@ def _along(course, j, x, y):  # type: ignore[no-untyped-def]
 
 
 @inner_njit()
-def _cross(course, j, before, x, y, level):  # type: ignore[no-untyped-def]
-    """Where the speed along (x, y) passes `level` between sample j and the one `before` it, or behind."""
-    a, b = _along(course, before, x, y), _along(course, j, x, y)
-    return j + (before - j) * (level - b) / (a - b) if a != b else float(j)
+def _cross(course, j, neighbour, x, y, level):  # type: ignore[no-untyped-def]
+    """Sample at which the speed along (x, y) crosses `level` between sample j and its `neighbour`, j ± 1."""
+    a, b = _along(course, neighbour, x, y), _along(course, j, x, y)
+    return j + (neighbour - j) * (level - b) / (a - b) if a != b else float(j)
 
 
 @inner_njit()
@@ -222,9 +222,9 @@ def place_leaving(track, course, start, top, x, y, rule):  # type: ignore[no-unt
     size = pitch.shape[0]
     bottom = lowest(pitch, start, top)
     if pitch[start % size] - pitch[bottom % size] >= rule.dip_rad:
-        at, sd = refine_leaving(pitch, bottom, start, rule.rate_hz, rule)
-        if at == at and abs(at - off) <= rule.near_push:
-            return at, sd
+        sample, sd = refine_leaving(pitch, bottom, start, rule.rate_hz, rule)
+        if sample == sample and abs(sample - off) <= rule.near_push:
+            return sample, sd
     return off, 2.0 * rule.sd_s
 
 
@@ -274,17 +274,17 @@ def learn_level(q, valid, counts, sums, rules):  # type: ignore[no-untyped-def]
 
 @inner_njit()
 def _take_sample(q, acc, k, turns, track, accs):  # type: ignore[no-untyped-def]
-    """Remember orientation (4,) and force (3,) of sample k, and what is derived of them."""
-    here = k % track.shape[0]
+    """Store orientation (4,), force (3,) and derived quantities of sample k."""
+    row = k % track.shape[0]
     w, x, y, z = q
     a, b, c = acc
-    turns[here, 0], turns[here, 1], turns[here, 2], turns[here, 3] = w, x, y, z
-    accs[here, 0], accs[here, 1], accs[here, 2] = a, b, c
-    track[here, PITCH] = asin(min(1.0, max(-1.0, 2.0 * (x * z - w * y))))
-    track[here, ACC_X] = (
+    turns[row, 0], turns[row, 1], turns[row, 2], turns[row, 3] = w, x, y, z
+    accs[row, 0], accs[row, 1], accs[row, 2] = a, b, c
+    track[row, PITCH] = asin(min(1.0, max(-1.0, 2.0 * (x * z - w * y))))
+    track[row, ACC_X] = (
         (1.0 - 2.0 * (y * y + z * z)) * a + 2.0 * (x * y - w * z) * b + 2.0 * (x * z + w * y) * c
     )
-    track[here, ACC_Y] = (
+    track[row, ACC_Y] = (
         2.0 * (x * y + w * z) * a + (1.0 - 2.0 * (x * x + z * z)) * b + 2.0 * (y * z - w * x) * c
     )
 
@@ -325,10 +325,10 @@ def _tell_swing(found_int, found_float, total, track, course, accs, counters, su
     off, off_sd = place_leaving(track, course, start, top, x, y, rule)
     on = place_landing(course, accs, top, end, x, y, rule)
     sums[TYPICAL] += (1.0 if sums[TYPICAL] == 0.0 else LATELY) * (way - sums[TYPICAL])
-    for kind, at, sd in ((TC, off, off_sd), (IC, on, rule.sd_s)):
+    for kind, sample, sd in ((TC, off, off_sd), (IC, on, rule.sd_s)):
         found_int[total, 0], found_int[total, 1] = kind, counters[NUMBER]
         found_int[total, 2], found_int[total, 3] = k, 1
-        found_float[total, 0], found_float[total, 1] = at, sd
+        found_float[total, 0], found_float[total, 1] = sample, sd
         counters[NUMBER] += 1
         total += 1
     return total
@@ -376,10 +376,10 @@ def foot_way_kernel(  # type: ignore[no-untyped-def]
             if not slow:
                 _begin_movement(track, counters, sums, k, rule)
         elif _comes_to_rest(track, counters, sums, k, slow, rule):
-            before = total
+            previous_total = total
             total = _tell_swing(found_int, found_float, total, track, course, accs, counters, sums, k, rule)
             # a heel that rises and is held goes nowhere yet: the swing that follows began with it
-            if total > before or counters[CALM] >= rule.long:
+            if total > previous_total or counters[CALM] >= rule.long:
                 counters[MOVING] = 0
         elif k - counters[START] > rule.longest:
             counters[MOVING] = 0

@@ -39,9 +39,9 @@ _TABLE: Final = (
 )
 
 
-def advise(what: str) -> str:
+def advise(format_name: str) -> str:
     """Advice for a recognised format that is not supported."""
-    return _ADVICE.get(what, _TABLE)
+    return _ADVICE.get(format_name, _TABLE)
 
 
 def sniff(data: bytes) -> tuple[Kind, str]:

@@ -38,8 +38,8 @@ def segment_named(name: str) -> Segment | None:
 
 def side_in(text: str) -> str | None:
     """Side, "l" or "r", named in a text; None if none or both."""
-    found = {_SIDE[word] for word in re.split(r"[\s_\-./]+", text.lower()) if word in _SIDE}
-    return found.pop() if len(found) == 1 else None
+    sides = {_SIDE[word] for word in re.split(r"[\s_\-./]+", text.lower()) if word in _SIDE}
+    return sides.pop() if len(sides) == 1 else None
 
 
 def segment_in(text: str) -> Segment | None:
@@ -48,10 +48,10 @@ def segment_in(text: str) -> Segment | None:
         r"\.(txt|csv|tsv|gz|parquet)$", "", text.replace("\\", "/").rsplit("/", 1)[-1], flags=re.IGNORECASE
     )
     words = [w for w in re.split(r"[\s_\-.]+", stem) if w]
-    found = {
+    segments = {
         s
         for n in (1, 2, 3)
         for i in range(len(words) - n + 1)
         if (s := segment_named("_".join(words[i : i + n])))
     }
-    return found.pop() if len(found) == 1 else None
+    return segments.pop() if len(segments) == 1 else None

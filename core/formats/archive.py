@@ -91,7 +91,7 @@ def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> 
     """
     limits = limits or ArchiveLimits()
     out: list[SourceFile] = []
-    taken: set[str] = set()
+    used_names: set[str] = set()
     for file in files:
         if not _looks_packed(file):
             members = [file]
@@ -105,8 +105,8 @@ def expand(files: Iterable[SourceFile], limits: ArchiveLimits | None = None) -> 
             else:
                 members = [file]
         for m in members:
-            name = m.name if m.name not in taken else f"{file.name}/{m.name}"
-            taken.add(name)
+            name = m.name if m.name not in used_names else f"{file.name}/{m.name}"
+            used_names.add(name)
             out.append(m if name == m.name else SourceFile(name, m.size, m.read, m.opener))
     return out
 
@@ -141,29 +141,29 @@ def _members(name: str, data: bytes, limits: ArchiveLimits) -> list[SourceFile]:
         )
     for info in infos:
         _check_entry(name, info, limits)
-    found = [
+    members = [
         SourceFile(info.filename, info.file_size, _MemberReader(name, archive, info))
         for info in infos
         if not info.is_dir() and "__MACOSX" not in PurePosixPath(info.filename).parts
     ]
-    names = {f.name for f in found}
+    names = {f.name for f in members}
     if is_workbook(names):
         return read_sheets(name, data)
     if names >= _SPREADSHEET:
         raise FormatError(
             "unsupported_format", f"{name} is an OpenDocument spreadsheet; save it as .xlsx or CSV."
         )
-    found = [
+    members = [
         inner
-        for f in found
+        for f in members
         for inner in (_members(f.name, f.read(), limits) if _is_workbook_name(f.name) else [f])
     ]
     if EPISODE_MARK not in names:
-        return found
-    told = [f for f in found if f.name == EPISODE_MANIFEST]
-    return told + [
+        return members
+    manifests = [f for f in members if f.name == EPISODE_MANIFEST]
+    return manifests + [
         SourceFile(f.name.removeprefix(EPISODE_RECORDING), f.size, f.read, f.opener)
-        for f in found
+        for f in members
         if f.name.startswith(EPISODE_RECORDING)
     ]
 
@@ -233,7 +233,7 @@ class _MemberReader:
     info: zipfile.ZipInfo
 
     def __call__(self) -> bytes:
-        where = f"{self.name}, member '{self.info.filename}'"
+        label = f"{self.name}, member '{self.info.filename}'"
         out = bytearray()
         try:
             with self.archive.open(self.info) as stream:
@@ -241,15 +241,15 @@ class _MemberReader:
                     out += chunk
                     if len(out) > self.info.file_size:
                         raise ArchiveError(
-                            "zip_bomb", f"{where}: more bytes than declared; zip the files again."
+                            "zip_bomb", f"{label}: more bytes than declared; zip the files again."
                         )
         except _DAMAGE as e:
-            raise ArchiveError("zip_bad", f"{where} is damaged ({e}); zip the files again.") from e
+            raise ArchiveError("zip_bad", f"{label} is damaged ({e}); zip the files again.") from e
         if len(out) != self.info.file_size:
-            raise ArchiveError("zip_bad", f"{where} ends early; zip the files again.")
+            raise ArchiveError("zip_bad", f"{label} ends early; zip the files again.")
         if (is_zip(out[:4]) and not _is_workbook_name(self.info.filename)) or is_gzip(out[:2]):
             raise ArchiveError(
-                "zip_nested", f"{where} is an archive itself; put the recordings directly into one zip."
+                "zip_nested", f"{label} is an archive itself; put the recordings directly into one zip."
             )
         return bytes(out)
 
@@ -257,29 +257,29 @@ class _MemberReader:
 def _unpacked(name: str, data: bytes, limits: ArchiveLimits) -> SourceFile:
     """Unpack a gzip with all its members, counting the output."""
     out = bytearray()
-    rest = data
+    remaining = data
     try:
-        while is_gzip(rest):
+        while is_gzip(remaining):
             stream = zlib.decompressobj(wbits=31)
             while not stream.eof:
-                before = len(out)
-                out += stream.decompress(rest, _CHUNK)
-                rest = stream.unconsumed_tail
+                previous_size = len(out)
+                out += stream.decompress(remaining, _CHUNK)
+                remaining = stream.unconsumed_tail
                 if len(out) > limits.total:
                     raise ArchiveError(
                         "zip_bomb",
                         f"{name} unpacks to more than {limits.total / 1e6:.0f} MB; upload it in parts.",
                     )
                 _check_ratio(name, len(out), len(data), limits)
-                if len(out) == before and not rest and not stream.eof:
+                if len(out) == previous_size and not remaining and not stream.eof:
                     raise ArchiveError("zip_bad", f"{name} ends in the middle; upload it again.")
-            rest = stream.unused_data
+            remaining = stream.unused_data
     except zlib.error as e:
         raise ArchiveError("zip_bad", f"{name} is damaged ({e}); upload it again.") from e
     if is_zip(out[:4]) or is_gzip(out[:2]):
         raise ArchiveError(
             "zip_nested", f"{name} is an archive inside an archive; upload the files themselves."
         )
-    shown = PurePosixPath(name)
-    plain = shown.with_suffix("") if shown.suffix.lower() == ".gz" else shown
+    path = PurePosixPath(name)
+    plain = path.with_suffix("") if path.suffix.lower() == ".gz" else path
     return SourceFile.of_bytes(str(plain), bytes(out))

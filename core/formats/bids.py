@@ -70,13 +70,13 @@ def describe_table(name: str, head: bytes, channels: bytes, sidecar: bytes | Non
             f"{name} has {cells} columns, but its channels.tsv names {len(rows)}; export both again.",
         )
     points, units, time = _sort_channels(rows, name)
-    found = {
+    groups = {
         point: {
             kind: tuple(axes[a] for a in _AXES) for kind, axes in kinds.items() if set(axes) == set(_AXES)
         }
         for point, kinds in points.items()
     }
-    columns = {point: Channels(**kinds) for point, kinds in found.items() if "acc" in kinds}
+    columns = {point: Channels(**kinds) for point, kinds in groups.items() if "acc" in kinds}
     if not columns:
         types = ", ".join(sorted({row["type"] for row in rows})) or "none"
         raise FormatError(
@@ -117,10 +117,10 @@ def _sort_channels(
         if kind is None or row["component"].lower() not in _AXES:
             continue
         axes = points.setdefault(row["tracked_point"], {}).setdefault(kind, {})
-        taken = axes.setdefault(row["component"].lower(), column)
-        if taken != column:
-            what = f"{row['type']} {row['component']} of '{row['tracked_point']}'"
-            raise _ambiguous(name, what, taken, column)
+        previous = axes.setdefault(row["component"].lower(), column)
+        if previous != column:
+            label = f"{row['type']} {row['component']} of '{row['tracked_point']}'"
+            raise _ambiguous(name, label, previous, column)
         if units.setdefault(kind, row["units"]) != row["units"] and kind != "mag":
             raise FormatError(
                 "unknown_unit", f"{name}: its channels of type {row['type']} have several units."
@@ -128,10 +128,10 @@ def _sort_channels(
     return points, units, time
 
 
-def _ambiguous(name: str, what: str, first: str, second: str) -> FormatError:
+def _ambiguous(name: str, label: str, first: str, second: str) -> FormatError:
     return FormatError(
         "ambiguous_column",
-        f"{name}: expected one column for {what}, but its channels.tsv names columns {first} and {second}. "
+        f"{name}: expected one column for {label}, but its channels.tsv names columns {first} and {second}. "
         "Give them different tracked points, or export one of them.",
     )
 
@@ -146,22 +146,23 @@ def _rows(channels: bytes, name: str) -> list[dict[str, str]]:
     return rows
 
 
-def _unit(said: str, known: Mapping[str, float], name: str) -> str:
-    unit = _NAMES.get(said, said)
-    if unit not in known:
+def _unit(unit_text: str, factors: Mapping[str, float], name: str) -> str:
+    unit = _NAMES.get(unit_text, unit_text)
+    if unit not in factors:
         raise FormatError(
-            "unknown_unit", f"{name}: its channels are in '{said}', expected one of {', '.join(known)}."
+            "unknown_unit",
+            f"{name}: its channels are in '{unit_text}', expected one of {', '.join(factors)}.",
         )
     return unit
 
 
 def _rate(sidecar: bytes | None, rows: Sequence[Mapping[str, str]], name: str) -> float:
     """Effective rate from the sidecar, else its nominal rate, else that of the channels."""
-    said: Any = {}
+    info: Any = {}
     with suppress(ValueError):
-        said = read_json(sidecar or b"{}")
+        info = read_json(sidecar or b"{}")
     keys = ("SamplingFrequencyEffective", "SamplingFrequency")
-    candidates: list[Any] = [said.get(key) for key in keys] if isinstance(said, dict) else []
+    candidates: list[Any] = [info.get(key) for key in keys] if isinstance(info, dict) else []
     candidates += [row.get("sampling_frequency") for row in rows[:1]]
     for value in candidates:
         try:

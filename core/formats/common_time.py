@@ -1,7 +1,7 @@
-"""Drafts of a take → streams: every row at its true time, and one time origin per clock.
+"""Drafts of a trial → streams: every row at its true time, and one time origin per clock.
 
-A packet counter says when a sample was taken only relative to the counters of the other sensors of the take
-(they wrap at 16 bit and may start on both sides of the wrap), so time is made for all files together.
+Packet counters are comparable only among the sensors of one trial (they wrap at 16 bit and may start on
+both sides of the wrap), so the times of all files are determined together.
 """
 
 from __future__ import annotations
@@ -64,9 +64,9 @@ def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
     """Fill a rate that neither file nor clock gives: from the other sensors of the take, else report it."""
     if d.rate_hz is not None:
         return d
-    known = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
-    if len(known) == 1:
-        rate = known.pop()
+    rates = {o.rate_hz for o in all_of_take if o.clock == d.clock and o.rate_hz is not None}
+    if len(rates) == 1:
+        rate = rates.pop()
         note = Notice(
             "rate_from_others",
             f"{d.source} names no sampling rate; {rate:g} Hz was taken from the other sensors.",
@@ -86,28 +86,28 @@ def _with_rate(d: Draft, all_of_take: Sequence[Draft]) -> Draft:
 
 def _without_second_copies(drafts: Sequence[Draft]) -> list[Draft]:
     """Drop a file that was given twice; refuse two different takes of one sensor."""
-    kept: dict[tuple[str, str | None], Draft] = {}
+    drafts_by_key: dict[tuple[str, str | None], Draft] = {}
     for d in drafts:
         key = d.device_id, d.part
-        other = kept.get(key)
-        if other is None:
-            kept[key] = d
-        elif digest(other) == digest(d) and np.array_equal(other.ticks, d.ticks):
+        previous = drafts_by_key.get(key)
+        if previous is None:
+            drafts_by_key[key] = d
+        elif digest(previous) == digest(d) and np.array_equal(previous.ticks, d.ticks):
             note = Notice(
                 "file_given_twice",
-                f"{d.source} repeats {other.source} and was left out.",
+                f"{d.source} repeats {previous.source} and was left out.",
                 d.device_id,
                 severity="info",
             )
-            kept[key] = replace(other, notices=(*other.notices, note))
+            drafts_by_key[key] = replace(previous, notices=(*previous.notices, note))
         else:
             raise FormatError(
                 "duplicate_device",
-                f"{other.source} and {d.source} both come from sensor {d.device_id} but differ; "
+                f"{previous.source} and {d.source} both come from sensor {d.device_id} but differ; "
                 "upload one take at a time (each sensor once).",
                 sensor=d.device_id,
             )
-    return list(kept.values())
+    return list(drafts_by_key.values())
 
 
 def _in_order(d: Draft) -> Draft:
@@ -115,30 +115,34 @@ def _in_order(d: Draft) -> Draft:
     seconds = d.clock == "device"
     wrap = _wrap(d, d.ticks[np.isfinite(d.ticks)]) if d.clock == "counter" or d.wrap is not None else None
     signals = [d.acc] if d.gyr is None else [d.acc, d.gyr]
-    found = repair_clock(d.ticks, signals, seconds=seconds, wrap=wrap, tick=d.tick)
-    if not len(found.ticks):
+    true_clock = repair_clock(d.ticks, signals, seconds=seconds, wrap=wrap, tick=d.tick)
+    if not len(true_clock.ticks):
         raise FormatError("empty", f"{d.source} has no row with a valid counter or time.", sensor=d.device_id)
-    if found.constant is not None:
-        return _without_clock(d, found.constant, float(found.ticks[0]))
-    if found.restart is not None:
-        t = float(found.ticks[found.restart] - found.ticks[0]) if seconds else found.restart / _rate(d)
-        raise refuse_restart(d.source, d.device_id, found.restart, len(d.ticks), t)
-    notices = (*d.notices, *(_tell(r, d) for r in found.repairs))
+    if true_clock.constant is not None:
+        return _without_clock(d, true_clock.constant, float(true_clock.ticks[0]))
+    if true_clock.restart is not None:
+        t = (
+            float(true_clock.ticks[true_clock.restart] - true_clock.ticks[0])
+            if seconds
+            else true_clock.restart / _rate(d)
+        )
+        raise refuse_restart(d.source, d.device_id, true_clock.restart, len(d.ticks), t)
+    notices = (*d.notices, *(_tell(r, d) for r in true_clock.repairs))
     rate = d.rate_hz
-    if seconds and len(found.ticks) > 1:
-        measured = 1.0 / (found.step or _measure_step(found.ticks))
+    if seconds and len(true_clock.ticks) > 1:
+        measured = 1.0 / (true_clock.step or _measure_step(true_clock.ticks))
         if rate is not None and abs(measured - rate) > MOST_OFF * rate:
             notices = (*notices, _contradict(d, rate, measured))
             rate = None
         if rate is None and np.isfinite(measured):
             rate = measured
-    if found.rows is None:
-        kept = replace(d, ticks=found.ticks, rate_hz=rate, notices=notices)
+    if true_clock.rows is None:
+        result = replace(d, ticks=true_clock.ticks, rate_hz=rate, notices=notices)
     else:
-        rows = found.rows
-        kept = replace(
+        rows = true_clock.rows
+        result = replace(
             d,
-            ticks=found.ticks,
+            ticks=true_clock.ticks,
             acc=d.acc[rows],
             gyr=None if d.gyr is None else d.gyr[rows],
             mag=None if d.mag is None else d.mag[rows],
@@ -146,13 +150,13 @@ def _in_order(d: Draft) -> Draft:
             rate_hz=rate,
             notices=notices,
         )
-    if not has_whole_row(kept.acc):
+    if not has_whole_row(result.acc):
         raise FormatError(
             "empty",
             f"{d.source} has no row with both a valid counter and a complete acceleration; export it again.",
             sensor=d.device_id,
         )
-    return kept
+    return result
 
 
 def _measure_step(ticks: Floats) -> float:
@@ -173,7 +177,7 @@ def _contradict(d: Draft, declared: float, measured: float) -> Notice:
 
 
 def _tell(repair: Repair, d: Draft) -> Notice:
-    """What was repaired, as a notice; faults of many rows are a warning."""
+    """Notice of a clock repair; a warning if many rows are affected."""
     severity = repair.severity
     if severity == "info" and repair.code in LOSSY:
         severity = grade_loss(repair.rows, len(d.ticks))

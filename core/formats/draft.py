@@ -33,9 +33,9 @@ class Draft:
     ----------
     clock : kind of `ticks` (n,): "counter" packet counter as written, "device" seconds, "index" row number.
     acc, gyr, mag : (n, 3), quat : (n, 4); SI units, NaN where missing; None without such columns.
-    rate_hz : None = the file does not say. wrap : tick at which the clock starts again; None = a device clock
-        never does, a counter at 16 bit, or 32 when it shows more.
-    segment : where it is worn, as the file says it; None = it does not. tick : s of the smallest unit in
+    rate_hz : None = not given in the file. wrap : tick at which the clock starts again; None = never for a
+        device clock, at 16 bit for a counter, or at 32 bit if its values exceed 16.
+    segment : sensor placement given in the file, None without one. tick : s of the smallest unit in
         which a device clock is written, 0 = unknown. part : "gyr", "mag", "linear" (acceleration without
         gravity) or "gravity" where `acc` holds that signal of a sensor whose others are in other files.
     """
@@ -84,10 +84,10 @@ def make_draft(
             f"{source}: the acceleration of {device} holds no numbers; export it again with acceleration.",
             sensor=device,
         )
-    told = [replace(n, sensor=device) for n in notices]
+    draft_notices = [replace(n, sensor=device) for n in notices]
     gyr, mag, quat = (x if x is not None and np.isfinite(x).any() else None for x in (gyr, mag, quat))
     if gyr is None:
-        told.append(
+        draft_notices.append(
             Notice(
                 "missing_gyro",
                 f"{source}: sensor {device} has no gyroscope signal, so no walk can be computed from it. "
@@ -95,7 +95,9 @@ def make_draft(
                 device,
             )
         )
-    return Draft(device, source, clock, ticks, acc, gyr, mag, quat, rate_hz, tuple(told), wrap, segment, tick)
+    return Draft(
+        device, source, clock, ticks, acc, gyr, mag, quat, rate_hz, tuple(draft_notices), wrap, segment, tick
+    )
 
 
 def grade_loss(lost: int, rows: int) -> Severity:

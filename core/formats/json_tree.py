@@ -63,17 +63,17 @@ def _read_whole(digits: str) -> int:
 
 
 def _make_object(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    made = dict(pairs)
-    if len(made) < len(pairs):
+    mapping = dict(pairs)
+    if len(mapping) < len(pairs):
         twice, _ = Counter(key for key, _ in pairs).most_common(1)[0]
         raise ValueError(f"the key '{_shorten_key(twice)}' is given twice")
-    return made
+    return mapping
 
 
 def _shorten_key(key: str) -> str:
     """An external key in displayable form: valid Unicode, at most MOST_SHOWN characters."""
-    shown = key.encode("utf-8", "backslashreplace").decode()
-    return shown if len(shown) <= MOST_SHOWN else f"{shown[:MOST_SHOWN]}…"
+    label = key.encode("utf-8", "backslashreplace").decode()
+    return label if len(label) <= MOST_SHOWN else f"{label[:MOST_SHOWN]}…"
 
 
 def _check_values(root: object, *, has_surrogates: bool) -> None:

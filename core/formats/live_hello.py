@@ -77,8 +77,8 @@ class Hello:
         for info in self.streams:
             if info.stream == number:
                 return info
-        known = ", ".join(str(s.stream) for s in self.streams)
-        raise InputError("batch_stream", f"Stream {number} is not in the hello; it names {known}.")
+        numbers = ", ".join(str(s.stream) for s in self.streams)
+        raise InputError("batch_stream", f"Stream {number} is not in the hello; it names {numbers}.")
 
     @property
     def sensors(self) -> tuple[SensorInfo, ...]:
@@ -189,19 +189,19 @@ def _refuse_twice(hello: Hello) -> None:
             "hello_bad_value", f"{len(hello.sensors)} sensors, at most {MOST_SENSORS} are taken."
         )
     ids: set[str] = set()
-    worn: dict[str, str] = {}
+    devices: dict[str, str] = {}
     for x in hello.sensors:
         if x.id in ids:
             raise InputError("duplicate_device", f"Sensor {x.id} is named twice.", sensor=x.id)
         ids.add(x.id)
-        if x.segment is not None and x.segment in worn:
+        if x.segment is not None and x.segment in devices:
             raise InputError(
                 "duplicate_segment",
-                f"Sensors {worn[x.segment]} and {x.id} are both worn on {x.segment}; choose one.",
+                f"Sensors {devices[x.segment]} and {x.id} are both worn on {x.segment}; choose one.",
                 sensor=x.id,
             )
         if x.segment is not None:
-            worn[x.segment] = x.id
+            devices[x.segment] = x.id
 
 
 def _object(value: object, path: str) -> Mapping[str, Any]:
@@ -243,6 +243,6 @@ def _number(node: Mapping[str, Any], key: str, path: str) -> float | None:
 
 
 def _wrong(path: str, value: object, expected: str) -> InputError:
-    shown = repr(value)
-    shown = shown if len(shown) <= 40 else shown[:37] + "..."
-    return InputError("hello_bad_value", f"{path} is {shown}; expected {expected}.")
+    text = repr(value)
+    text = text if len(text) <= 40 else text[:37] + "..."
+    return InputError("hello_bad_value", f"{path} is {text}; expected {expected}.")

@@ -169,12 +169,12 @@ def read_batch_header(frame: Buffer) -> Header:
     """
     if len(frame) < _HEAD.size + _CRC.size:
         raise InputError("batch_shape", f"A frame of {len(frame)} bytes is shorter than the header.")
-    magic, *rest = _HEAD.unpack_from(frame)
+    magic, *fields = _HEAD.unpack_from(frame)
     if magic != MAGIC:
         raise InputError(
             "batch_magic", f"The frame starts with {magic:#010x}; expected {MAGIC:#010x} (SGL1)."
         )
-    header = Header(*rest)
+    header = Header(*fields)
     expected = _check(header)
     if len(frame) != expected:
         raise InputError(
@@ -263,8 +263,8 @@ def batch_of_json(root: Mapping[str, object]) -> SampleBatch:
     try:
         with np.errstate(over="ignore"):
             samples = np.array(root.get("samples"), np.float64).astype(np.float32)
-        given = root.get("offsets_us")
-        offsets = None if given is None else np.array(given, np.uint32)
+        raw_offsets = root.get("offsets_us")
+        offsets = None if raw_offsets is None else np.array(raw_offsets, np.uint32)
     except (TypeError, ValueError, OverflowError) as e:
         raise InputError("batch_shape", f"Samples or offsets of batch {seq} are not numbers: {e}.") from e
     batch = SampleBatch(stream, seq, t0_us, sent_us, samples, offsets)
@@ -338,7 +338,7 @@ def scan(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
 
 def scan_records(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
     """As `scan` for data that begins with a record at `start`, such as the new end of a log."""
-    view, found = memoryview(data), []
+    view, records = memoryview(data), []
     while len(view) - start >= _RECORD.size:
         length, crc = _RECORD.unpack_from(view, start)
         first = start + _RECORD.size
@@ -349,5 +349,5 @@ def scan_records(data: Buffer, start: int = 0) -> tuple[list[LogRecord], int]:
             break
         start = first + length
         kind: Kind = chr(body[0])  # type: ignore[assignment]
-        found.append(LogRecord(kind, bytes(body[1:]), start))
-    return found, start
+        records.append(LogRecord(kind, bytes(body[1:]), start))
+    return records, start

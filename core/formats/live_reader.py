@@ -69,23 +69,23 @@ def read_live_log(data: bytes, source: str) -> Recording:
     FormatError bad_live_log (damaged before the first sample), empty (no sample).
     """
     records, length = scan(data)
-    taken = _taken(records, source)
+    log = _taken(records, source)
     if length < len(data):
-        taken.notices.append(
+        log.notices.append(
             Notice(
                 "live_log_torn",
                 f"The end of {source} ({len(data) - length} B) is incomplete or damaged and was left out; "
-                f"batches before it that are whole: {len(taken.batches)}.",
+                f"batches before it that are whole: {len(log.batches)}.",
             )
         )
-    if not taken.batches:
+    if not log.batches:
         raise FormatError("empty", f"{source} holds a live take without a sample.")
-    _compare_finish(taken, source)
-    streams, rest = _streams(taken, source)
+    _compare_finish(log, source)
+    streams, stream_notices = _streams(log, source)
     return Recording(
         streams=streams,
-        segments={x.id: x.segment for x in taken.hello.sensors if x.id in streams},
-        notices=(*taken.notices, *rest),
+        segments={x.id: x.segment for x in log.hello.sensors if x.id in streams},
+        notices=(*log.notices, *stream_notices),
     )
 
 
@@ -120,7 +120,7 @@ def _taken(records: Sequence[LogRecord], source: str) -> _Taken:
             "bad_live_log", f"{source} is damaged at its beginning; there is no hello to read it by."
         )
     try:
-        taken = _Taken(parse_hello(records[0].body))
+        log = _Taken(parse_hello(records[0].body))
     except InputError as e:
         raise FormatError("bad_live_log", f"{source}: {e.message}") from e
     digest, number = hashlib.sha256(), 0
@@ -128,55 +128,55 @@ def _taken(records: Sequence[LogRecord], source: str) -> _Taken:
         for r in records[1:]:
             number += 1
             if r.kind == "F":
-                taken.finish = parse_finish(r.body)
+                log.finish = parse_finish(r.body)
                 continue
             header = read_batch_header(r.body)
-            check_fits(header, taken.hello)
-            if r.kind == "H" or header.seq != len(taken.batches):
-                raise InputError("batch_shape", f"batch {header.seq} follows {len(taken.batches) - 1}")
+            check_fits(header, log.hello)
+            if r.kind == "H" or header.seq != len(log.batches):
+                raise InputError("batch_shape", f"batch {header.seq} follows {len(log.batches) - 1}")
             digest.update(view_samples(r.body, header))
-            taken.batches.append(decode_batch(r.body, header))
+            log.batches.append(decode_batch(r.body, header))
     except InputError as e:
         message = f"Record {number} of {source} does not belong there ({e.message}); the rest was left out."
-        taken.notices.append(Notice("live_log_torn", message))
-    taken.digest = digest.hexdigest()
-    return taken
+        log.notices.append(Notice("live_log_torn", message))
+    log.digest = digest.hexdigest()
+    return log
 
 
-def _compare_finish(taken: _Taken, source: str) -> None:
-    if taken.finish is None:
+def _compare_finish(log: _Taken, source: str) -> None:
+    if log.finish is None:
         message = (
             f"{source} ends without a finish: the sender never said that this is all. "
-            f"Batches received: {len(taken.batches)}."
+            f"Batches received: {len(log.batches)}."
         )
-        taken.notices.append(Notice("live_unfinished", message))
-    elif taken.finish.count != len(taken.batches):
-        message = f"Number of batches by the sender: {taken.finish.count}, in {source}: {len(taken.batches)}."
-        taken.notices.append(Notice("live_count_mismatch", message))
-    elif taken.finish.sha256 != taken.digest:
+        log.notices.append(Notice("live_unfinished", message))
+    elif log.finish.count != len(log.batches):
+        message = f"Number of batches by the sender: {log.finish.count}, in {source}: {len(log.batches)}."
+        log.notices.append(Notice("live_count_mismatch", message))
+    elif log.finish.sha256 != log.digest:
         message = (
-            f"The samples in {source} are not those the sender hashed (sha256 {taken.digest[:12]}…, sent "
-            f"{taken.finish.sha256[:12]}…). Every batch passed its own checksum; look at the sender."
+            f"The samples in {source} are not those the sender hashed (sha256 {log.digest[:12]}…, sent "
+            f"{log.finish.sha256[:12]}…). Every batch passed its own checksum; look at the sender."
         )
-        taken.notices.append(Notice("live_hash_mismatch", message))
+        log.notices.append(Notice("live_hash_mismatch", message))
 
 
-def _streams(taken: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Notice]]:
+def _streams(log: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Notice]]:
     """Streams by sensor, in the order of the hello, and notices about them."""
-    clock = LiveClock(taken.hello)
+    clock = LiveClock(log.hello)
     by_number: dict[int, list[SampleBatch]] = {}
     times: dict[int, list[Micros]] = {}
-    rate = {s.stream: s.rate_hz for s in taken.hello.streams}
-    for batch in taken.batches:
+    rate = {s.stream: s.rate_hz for s in log.hello.streams}
+    for batch in log.batches:
         t = sample_times_us(batch, rate[batch.stream])
         clock.push(batch.stream, int(t[0]), int(t[-1]), batch.sent_us)
         by_number.setdefault(batch.stream, []).append(batch)
         times.setdefault(batch.stream, []).append(t)
-    first = taken.batches[0]
+    first = log.batches[0]
     origin = first.t0_us + (clock.offset_us(first.stream, final=False) or 0)
     streams: dict[str, ImuStream] = {}
     notices: list[Notice] = []
-    for info in taken.hello.streams:
+    for info in log.hello.streams:
         if info.stream not in times:
             notices.append(_missing(info.sensors))
             continue
@@ -191,7 +191,7 @@ def _streams(taken: _Taken, source: str) -> tuple[dict[str, ImuStream], list[Not
             else:
                 streams[sensor.id] = stream
     if not clock.single:
-        own = ", ".join(x.id for s in taken.hello.streams if s.clock == "own" for x in s.sensors)
+        own = ", ".join(x.id for s in log.hello.streams if s.clock == "own" for x in s.sensors)
         message = (
             f"{own}: each has a clock of its own, aligned by when its batches were sent in the first second. "
             "Times between sensors are uncertain by how much the radio delays vary, some 10 ms."

@@ -111,7 +111,7 @@ def manifest_of(root: object) -> Manifest:
         "test_limits",
     )
     subject = top.child("subject")
-    who = _subject(subject)
+    subject_info = _subject(subject)
     protocol = top.text("protocol")
     if protocol is not None and protocol not in PROTOCOLS:
         raise ManifestError(
@@ -125,7 +125,7 @@ def manifest_of(root: object) -> Manifest:
     mounting = top.child("mounting")
     sensors = top.child("sensors")
     return Manifest(
-        subject=who,
+        subject=subject_info,
         protocol=protocol,
         mounting=MappingProxyType({_segment(k, f"mounting.{k}"): mounting.string(k) for k in mounting.keys}),
         sensors=MappingProxyType(_sensors(sensors)),
@@ -207,21 +207,21 @@ _SUBJECT_KEYS: Final = {
 
 def _sensors(node: JsonNode) -> dict[str, Segment | None]:
     out: dict[str, Segment | None] = {}
-    worn: dict[str, str] = {}
+    devices: dict[str, str] = {}
     for device in node.keys:
         name = node.text(device)
         if name is None:
             out[device] = None
             continue
         segment = _segment(name, f"sensors.{device}")
-        if segment in worn:
+        if segment in devices:
             raise ManifestError(
                 "duplicate_segment",
-                f"sensors.{device}: {segment} is already given to {worn[segment]}; "
+                f"sensors.{device}: {segment} is already given to {devices[segment]}; "
                 "choose one, the other is null or another segment.",
                 sensor=device,
             )
-        worn[segment] = device
+        devices[segment] = device
         out[device] = segment
     return out
 

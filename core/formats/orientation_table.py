@@ -81,11 +81,11 @@ def read_orientation_table(data: bytes, source: str) -> OrientationTable:
     groups = _group(names, source)
     if not groups:
         raise FormatError("no_quaternions", f"{source} has no quaternions; found {_few(names)}. {HOW}")
-    wanted = [times[0], *(column for columns in groups.values() for column in columns)]
+    selection = [times[0], *(column for columns in groups.values() for column in columns)]
     comma = layout.has_decimal_comma(layout.first_rows(body), separator)
-    table = text.read_columns(body, source, separator, names, wanted, decimal_comma=comma)
-    found = _TIME.fullmatch(times[0])
-    unit = TIME_UNITS[((found and found[1]) or "s").lower()]
+    table = text.read_columns(body, source, separator, names, selection, decimal_comma=comma)
+    match = _TIME.fullmatch(times[0])
+    unit = TIME_UNITS[((match and match[1]) or "s").lower()]
     t_s = table.values[times[0]] * unit
     order = np.flatnonzero(np.isfinite(t_s))
     if len(order) < 2 or (np.diff(t_s[order]) <= 0.0).any():
@@ -107,8 +107,8 @@ def _open_sto(data: bytes, head: list[bytes], source: str) -> tuple[list[str], m
         )
     if end + 1 >= len(head):
         raise FormatError("empty", f"{source} has a header but no samples; export it again.")
-    first, *others = text.split(head[end + 1], b"\t")
-    names = [first, *(f"{name}_{part}" for name in others for part in _ORDERS[0])]
+    first, *quaternion_names = text.split(head[end + 1], b"\t")
+    names = [first, *(f"{name}_{part}" for name in quaternion_names for part in _ORDERS[0])]
     body = bytes(text.after_lines(data, end + 2)).replace(b",", b"\t")
     return names, memoryview(body), b"\t"
 
@@ -127,14 +127,14 @@ def _group(names: list[str], source: str) -> dict[str, tuple[str, ...]]:
     """Name → its four columns, scalar first; incomplete ones are omitted."""
     parts: dict[str, dict[str, str]] = {}
     for column in names:
-        if (found := _PART.fullmatch(column)) is not None:
-            name, part = found["name"], found["part"].lower()
-            other = parts.setdefault(name, {}).setdefault(part, column)
-            if other != column:
+        if (match := _PART.fullmatch(column)) is not None:
+            name, part = match["name"], match["part"].lower()
+            previous = parts.setdefault(name, {}).setdefault(part, column)
+            if previous != column:
                 raise FormatError(
                     "ambiguous_column",
-                    f"{source}: expected one column for {part} of '{name}', found '{other}' and '{column}'. "
-                    "Remove or rename one of them.",
+                    f"{source}: expected one column for {part} of '{name}', found '{previous}' and '{column}'"
+                    ". Remove or rename one of them.",
                 )
     return {
         name: tuple(columns[part] for part in order)

@@ -176,12 +176,12 @@ def open_long(file: SourceFile) -> Recording:
             info = _read_info((meta.metadata or {}).get(_KEY), file.name)
             first, _ = _find_ends(reader, 0)
             _, last = _find_ends(reader, meta.num_row_groups - 1)
-            there = set(reader.schema_arrow.names)
+            column_names = set(reader.schema_arrow.names)
         subject, sensors = _read_subject(info), _list(info["sensors"])
         long = {}
         for sensor in sensors:
             device = str(sensor["id"])
-            has_gyro = f"{device}.gyr_x" in there
+            has_gyro = f"{device}.gyr_x" in column_names
             long[device] = LongStream(
                 device_id=device,
                 source=str(sensor["source"]),
@@ -260,7 +260,7 @@ def _read_subject(info: Mapping[str, object]) -> Subject:
 
 def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) -> Recording:
     axis = file.read([_TIME], use_threads=False)[_TIME].to_numpy() * 1e-6
-    there = frozenset(file.schema_arrow.names)
+    column_names = frozenset(file.schema_arrow.names)
     sensors = _list(info["sensors"])
     rooms = {kind: _make_rooms(len(sensors), len(axis), len(names)) for kind, names in _AXES.items()}
     streams: dict[str, ImuStream] = {}
@@ -268,10 +268,10 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
     notices: list[Notice] = []
     for sensor in sensors:
         device = str(sensor["id"])
-        signals, rows = _read_signals(file, device, there, rooms)
+        signals, rows = _read_signals(file, device, column_names, rooms)
         acc = signals["acc"]
-        known = [Notice.from_json(n) for n in _list(sensor["notices"])]
-        known += _clear_infinite(device, signals)
+        sensor_notices = [Notice.from_json(n) for n in _list(sensor["notices"])]
+        sensor_notices += _clear_infinite(device, signals)
         if not has_whole_row(acc):
             message = f"{device} in {source} holds no acceleration; results that need it are left out."
             notices.append(Notice("sensor_missing", message, device))
@@ -279,7 +279,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
         if (gyr := signals["gyr"]) is not None and not has_whole_row(gyr):
             signals["gyr"] = None
             message = f"{device} in {source} holds no angular rate; it cannot be used for orientations."
-            known.append(Notice("missing_gyro", message, device))
+            sensor_notices.append(Notice("missing_gyro", message, device))
         streams[device] = ImuStream(
             device_id=device,
             source=str(sensor["source"]),
@@ -291,7 +291,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
             rate_hz=float(str(sensor["rate_hz"])),
             clock=str(sensor["clock"]),
             digest=signal_digest(acc, signals["gyr"], signals["mag"]),
-            notices=tuple(known),
+            notices=tuple(sensor_notices),
         )
         if sensor["mapped"]:
             segments[device] = sensor["segment"]
@@ -312,7 +312,7 @@ def _recording(file: pq.ParquetFile, info: Mapping[str, object], source: str) ->
 def _read_signals(
     file: pq.ParquetFile,
     device: str,
-    there: frozenset[str],
+    column_names: frozenset[str],
     rooms: Mapping[str, Iterator[NDArray[np.float32]]],
 ) -> tuple[dict[str, Any], NDArray[np.int64] | slice]:
     """Signals (n, axes) of a sensor as float32, None if not in the file, and the rows it has.
@@ -323,7 +323,7 @@ def _read_signals(
     rows: NDArray[np.int64] | slice = slice(None)
     for kind, names in _AXES.items():
         columns = [f"{device}.{n}" for n in names]
-        if columns[0] not in there:
+        if columns[0] not in column_names:
             if kind == "acc":
                 raise KeyError(f"{device}.acc")
             continue

@@ -1,4 +1,4 @@
-"""One sensor from several files: acceleration, rate of turn, magnetic field, each on a clock of its own."""
+"""One sensor from several files: acceleration, angular rate and magnetic field, each with its own clock."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ _FASTER: Final = 1.2
 
 
 def join_parts(drafts: Sequence[Draft]) -> list[Draft]:
-    """Put the parts of every sensor together; other sensors pass as they are.
+    """Join the parts of every sensor; complete sensors are returned unchanged.
 
     Parameters
     ----------
-    drafts : whose times rise.
+    drafts : with increasing times.
 
     Raises
     ------
@@ -102,11 +102,11 @@ def _lay(part: Draft, ticks: Floats) -> Floats:
     if len(own) < 2:
         return np.full((len(ticks), 3), np.nan)
     out = np.stack([np.interp(ticks, own, values[:, k]) for k in range(3)], axis=1)
-    after = np.clip(np.searchsorted(own, ticks), 1, len(own) - 1)
+    upper = np.clip(np.searchsorted(own, ticks), 1, len(own) - 1)
     step = _spacing(own)
     outside = (ticks < own[0] - 0.5 * step) | (ticks > own[-1] + 0.5 * step)
-    inside = (ticks > own[after - 1]) & (ticks < own[after])
-    out[outside | (inside & (own[after] - own[after - 1] > _HOLE * step))] = np.nan
+    inside = (ticks > own[upper - 1]) & (ticks < own[upper])
+    out[outside | (inside & (own[upper] - own[upper - 1] > _HOLE * step))] = np.nan
     return out
 
 

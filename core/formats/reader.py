@@ -94,12 +94,14 @@ def read_recording(
     return _declared(recording, manifest, upload)
 
 
-def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload: _Upload) -> Manifest | None:
+def _find_manifest(
+    members: Sequence[SourceFile], manifest: Manifest | None, upload: _Upload
+) -> Manifest | None:
     """Find the manifest, which is required before tables can be read."""
     for member in members:
         if member.name.rsplit("/", 1)[-1] == EPISODE_MANIFEST:
-            told = parse_manifest(member.read())
-            given = told if given is None else given.complete_from(told)
+            member_manifest = parse_manifest(member.read())
+            manifest = member_manifest if manifest is None else manifest.complete_from(member_manifest)
             upload.sidecars.add(member.name)
             continue
         last = member.name.rsplit("/", 1)[-1].lower()
@@ -111,9 +113,9 @@ def _find_manifest(members: Sequence[SourceFile], given: Manifest | None, upload
         names = " and ".join(n for n, _ in upload.manifests)
         raise ManifestError("manifest_twice", f"There are several manifests ({names}); keep one.")
     if not upload.manifests:
-        return given
-    found = parse_manifest(upload.manifests[0][1])
-    return found if given is None else given.complete_from(found)
+        return manifest
+    upload_manifest = parse_manifest(upload.manifests[0][1])
+    return upload_manifest if manifest is None else manifest.complete_from(upload_manifest)
 
 
 def _describe(
@@ -123,16 +125,16 @@ def _describe(
     spec = manifest.source_of(member.name) if manifest else None
     if (spec and spec.columns) or not bids.is_table(member.name):
         return spec
-    beside = {m.name: m for m in members}
-    channels, sidecar = (beside.get(name) for name in bids.find_parts(member.name))
+    siblings = {m.name: m for m in members}
+    channels, sidecar = (siblings.get(name) for name in bids.find_parts(member.name))
     if channels is None or not bids.looks_like(data := text.to_utf8(channels.read())):
         return spec
     upload.sidecars |= {m.name for m in (channels, sidecar) if m is not None}
     try:
         with member.open() as opened:
             head = text.to_utf8(opened.read(1 << 16))
-        said = text.to_utf8(sidecar.read()) if sidecar else None
-        table = bids.describe_table(member.name, head, data, said)
+        sidecar_text = text.to_utf8(sidecar.read()) if sidecar else None
+        table = bids.describe_table(member.name, head, data, sidecar_text)
     except FormatError as e:
         upload.problems.append((member.name, e))
         upload.sidecars.add(member.name)
@@ -162,7 +164,7 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
         return
     raw = member.read()
     data = raw if parquet.looks_like(raw) or live_reader.looks_like(raw) else text.to_utf8(raw)
-    kind, what = _sniff.sniff(data)
+    kind, format_name = _sniff.sniff(data)
     if member.name in upload.sidecars or any(member.name == name for name, _ in upload.manifests):
         upload.sha256[member.name] = sha256(raw)
         return
@@ -188,9 +190,11 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
         elif kind == "table":
             raise FormatError("manifest_needed", _needs_manifest(member.name, data))
         elif kind == "known":
-            raise FormatError("unsupported_format", f"{member.name} is {what}; {_sniff.advise(what)}")
+            raise FormatError(
+                "unsupported_format", f"{member.name} is {format_name}; {_sniff.advise(format_name)}"
+            )
         else:
-            message = f"{member.name} is {what} and was not used."
+            message = f"{member.name} is {format_name} and was not used."
             upload.notices.append(Notice("ignored_file", message, severity="info"))
             return
         upload.sha256[member.name] = sha256(raw)
@@ -266,17 +270,19 @@ def _nothing_readable(upload: _Upload) -> FormatError:
         return FormatError(first.code, _tell_alike(errors), sensor=first.sensor, t_s=first.t_s)
     codes = {code for code, _ in alike}
     lines = [_tell_alike(errors) for errors in alike.values()] + [n.message for n in upload.notices]
-    shown = " ".join(lines[:_SHOWN]) + (f" … and {len(lines) - _SHOWN} more." if len(lines) > _SHOWN else "")
+    summary = " ".join(lines[:_SHOWN]) + (
+        f" … and {len(lines) - _SHOWN} more." if len(lines) > _SHOWN else ""
+    )
     code = codes.pop() if len(codes) == 1 and not upload.notices else "unknown_format"
-    return FormatError(code, f"No sensor recording was found; tried {list_formats()}. {shown}")
+    return FormatError(code, f"No sensor recording was found; tried {list_formats()}. {summary}")
 
 
 def _tell_alike(errors: Sequence[InputError]) -> str:
     """Error message for one of several files with the same fault, with the number of the others."""
-    others = len(errors) - 1
-    if not others:
+    count = len(errors) - 1
+    if not count:
         return errors[0].message
-    return f"{errors[0].message} The same holds of {others} other {plural(others, 'file', 'files')}."
+    return f"{errors[0].message} The same holds of {count} other {plural(count, 'file', 'files')}."
 
 
 def _stored(upload: _Upload) -> Recording:
@@ -310,18 +316,18 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
         notices += missing
     else:
         segments |= _worn(upload.drafts)
-    taken = {s for s in segments.values() if s is not None}
+    used_segments = {s for s in segments.values() if s is not None}
     for device in dict.fromkeys((*recording.streams, *recording.long)):
         described = upload.guessed or (manifest is not None and manifest.sources and not manifest.sensors)
         own = segment_named(device) if described else None
-        if own is not None and device not in segments and own not in taken:
+        if own is not None and device not in segments and own not in used_segments:
             segments[device] = own
-            taken.add(own)
+            used_segments.add(own)
     declared = manifest.protocol if manifest else None
     if declared is not None and recording.protocol not in ("walk", declared):
-        said = f"The file is of the protocol '{recording.protocol}', but it is analysed as '{declared}'"
+        difference = f"The file is of the protocol '{recording.protocol}', but it is analysed as '{declared}'"
         todo = f"For '{recording.protocol}', make a session with that protocol and upload the file there."
-        notices.append(Notice("protocol_differs", f"{said}, as was declared. {todo}"))
+        notices.append(Notice("protocol_differs", f"{difference}, as was declared. {todo}"))
     streams, corrected = correct_streams(recording.streams, manifest.corrections if manifest else {})
     return replace(
         recording,
@@ -339,19 +345,19 @@ def _declared(recording: Recording, manifest: Manifest | None, upload: _Upload) 
 
 def _worn(drafts: Sequence[Draft]) -> dict[str, Segment | None]:
     """Sensor placements given in the files; a segment claimed by two sensors is assigned to neither."""
-    said = {d.device_id: d.segment for d in drafts if d.segment is not None}
-    count = Counter(said.values())
-    return {device: segment for device, segment in said.items() if count[segment] == 1}
+    placements = {d.device_id: d.segment for d in drafts if d.segment is not None}
+    count = Counter(placements.values())
+    return {device: segment for device, segment in placements.items() if count[segment] == 1}
 
 
 def correct_streams(
     streams: Mapping[str, ImuStream], corrections: Mapping[str, SensorCorrection]
 ) -> tuple[dict[str, ImuStream], list[Notice]]:
     """Streams with declared corrections of axes and units, and a notice for each."""
-    wanted = {device.lower(): x for device, x in corrections.items()}
+    corrections_by_id = {device.lower(): x for device, x in corrections.items()}
     out, notices = dict(streams), []
     for device, stream in streams.items():
-        correction = wanted.get(device.lower())
+        correction = corrections_by_id.get(device.lower())
         if correction is None:
             continue
         out[device] = replace(
@@ -370,21 +376,21 @@ def correct_streams(
 
 
 def _assign(
-    declared: Mapping[str, Segment | None], recording: Recording, by: str
+    declared: Mapping[str, Segment | None], recording: Recording, origin: str
 ) -> tuple[dict[str, Segment | None], list[Notice]]:
     """Match declared ids to streams, ignoring case; a notice for each declared sensor without a file."""
     ids = {d.lower(): d for d in (*recording.long, *recording.streams)}
     segments: dict[str, Segment | None] = {}
     missing: list[Notice] = []
     for device, segment in declared.items():
-        found = ids.get(device.lower())
-        if found is not None:
-            segments[found] = segment
+        stream_id = ids.get(device.lower())
+        if stream_id is not None:
+            segments[stream_id] = segment
         elif segment is not None:
             missing.append(
                 Notice(
                     "sensor_missing",
-                    f"The {by} puts sensor {device} on {segment}, but no file holds it (found: "
+                    f"The {origin} puts sensor {device} on {segment}, but no file holds it (found: "
                     f"{', '.join(ids.values())}); results that need {segment} are left out.",
                     device,
                 )

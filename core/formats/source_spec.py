@@ -72,9 +72,9 @@ class SourceSpec:
     file : name or pattern with * and ?, compared with the whole path and with its last part.
     skip_rows : lines before the header. header_rows : lines of the header; None = as found in the file.
     index_column : the first column is no signal.
-    rate_hz : nominal sampling rate. time_column, time_unit : where the time is, and its unit or the length of
-        one tick in s, None = as found; counter : what counts the samples; without either the rate makes time.
-    gravity_included : False when the device has already removed gravity (not usable, said so).
+    rate_hz : nominal sampling rate. time_column, time_unit : column of time, and its unit or the length of
+        one tick in s, None = detected; counter : sample counter; without either, time follows from the rate.
+    gravity_included : False when the device has already removed gravity (refused with an error).
     columns : sensor id or segment → its columns; empty for formats that name their columns themselves.
     quat_order : "wxyz" or "xyzw". frame : "sensor" or None.
     """
@@ -151,11 +151,11 @@ def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
     if not inner.keys:
         return None, rate
     inner.only("column", "rate_hz", "wrap")
-    counted = _rate(inner)
-    if rate is not None and counted is not None and rate != counted:
+    count_rate = _rate(inner)
+    if rate is not None and count_rate is not None and rate != count_rate:
         raise ManifestError(
             "manifest_bad_value",
-            f"{node.path} has rate_hz {rate:g} and counter.rate_hz {counted:g}; give one of them.",
+            f"{node.path} has rate_hz {rate:g} and counter.rate_hz {count_rate:g}; give one of them.",
         )
     if node.text("time_column") is not None:
         raise ManifestError(
@@ -167,7 +167,7 @@ def _counter(node: JsonNode) -> tuple[Counter | None, float | None]:
             "manifest_bad_value",
             f"{inner.path}.wrap is {wrap}; expected how many counts there are, 256 for one of 8 bits.",
         )
-    return Counter(inner.string("column"), wrap), rate if counted is None else counted
+    return Counter(inner.string("column"), wrap), rate if count_rate is None else count_rate
 
 
 def _time_unit(node: JsonNode) -> str | float | None:

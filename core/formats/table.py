@@ -67,8 +67,8 @@ def read_table(data: bytes, source: str, spec: SourceSpec) -> list[Draft]:
 def _without_blank_end(table: text.Columns, spec: SourceSpec) -> text.Columns:
     """Drop trailing rows without any sensor value, as in exports with a longer EMG recording."""
     names = [name for channels in spec.columns.values() for _, name in list_asked(channels)]
-    known = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
-    end = known[-1] + 1 if len(known) else None
+    filled_rows = np.flatnonzero(np.isfinite(table.stack(names)).any(axis=1))
+    end = filled_rows[-1] + 1 if len(filled_rows) else None
     values = {name: values[:end] for name, values in table.values.items()}
     return text.Columns(values, table.notices, table.times)
 
@@ -98,24 +98,26 @@ class _Layout:
 
 
 def _lay_out(data: bytes, source: str, spec: SourceSpec) -> tuple[_Layout, SourceSpec]:
-    """What the head of a table says, and the entry with unique names; errors as in `read_table`."""
+    """Layout read from the head of a table, and the entry with unique names; errors as in `read_table`."""
     _check(spec, source)
     lines = text.head_lines(data, (spec.skip_rows or 0) + (spec.header_rows or 0) + LINES)
-    known = spec.separator.encode() if spec.separator else None
-    found = find_layout(lines, known)
-    skip, header = find_header(lines, spec, found, known)
+    declared_separator = spec.separator.encode() if spec.separator else None
+    layout = find_layout(lines, declared_separator)
+    skip, header = find_header(lines, spec, layout, declared_separator)
     rows = [r for r in lines[skip + header :] if r.strip()]
     if not rows:
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
     separator = (
-        known or (found.separator if found else guess_separator(rows[: max(1, len(rows) - 1)])) or b","
+        declared_separator
+        or (layout.separator if layout else guess_separator(rows[: max(1, len(rows) - 1)]))
+        or b","
     )
     titles = join_titles(lines[skip : skip + header], rows, separator, spec)
     spec = complete_names(spec, titles)
-    wanted = list_wanted(spec, titles, source)
+    column_names = list_wanted(spec, titles, source)
     times = () if spec.time_column is None else (spec.time_column,)
     comma = has_decimal_comma(rows, separator)
-    return _Layout(separator, skip + header, titles, wanted, comma, times), spec
+    return _Layout(separator, skip + header, titles, column_names, comma, times), spec
 
 
 def estimate_rows(head: bytes, size: int) -> float:
@@ -194,12 +196,12 @@ def _read_blocks(
     with file.open() as opened:
         for _ in range(layout.first_row):
             opened.readline()
-        rest = b""
+        remainder = b""
         while True:
             data = opened.read(_CHUNK)
-            body = rest + data
+            body = remainder + data
             end = len(body) if not data else body.rfind(b"\n") + 1
-            body, rest = body[:end], body[end:]
+            body, remainder = body[:end], body[end:]
             if body.strip():
                 part = memoryview(text.squeeze_blanks(body) if layout.separator == b" " else body)
                 table = layout.read(part, file.name)
@@ -217,31 +219,31 @@ def _read_blocks(
 
 
 def _check(spec: SourceSpec, source: str) -> None:
-    where = f"sources entry for '{spec.file}'"
+    entry = f"sources entry for '{spec.file}'"
     if not spec.columns:
         raise ManifestError(
-            "unknown_column", f"{where} names no columns; say which columns of {source} are which sensor."
+            "unknown_column", f"{entry} names no columns; say which columns of {source} are which sensor."
         )
     if spec.acc_unit is None and any(c.acc or c.linear or c.gravity for c in spec.columns.values()):
         raise ManifestError(
-            "unit_missing", f"{where}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
+            "unit_missing", f"{entry}: acc_unit is missing; expected one of {', '.join(ACC_UNITS)}."
         )
     if spec.gyr_unit is None and any(c.gyr for c in spec.columns.values()):
         raise ManifestError(
-            "unit_missing", f"{where}: gyr_unit is missing; expected one of {', '.join(GYR_UNITS)}."
+            "unit_missing", f"{entry}: gyr_unit is missing; expected one of {', '.join(GYR_UNITS)}."
         )
     if spec.rate_hz is None and spec.counter is not None:
-        raise ManifestError("rate_missing", f"{where}: counter.rate_hz is missing; give counts per second.")
+        raise ManifestError("rate_missing", f"{entry}: counter.rate_hz is missing; give counts per second.")
     if spec.rate_hz is None and spec.time_column is None:
         raise ManifestError(
-            "rate_missing", f"{where}: give rate_hz (samples per second), time_column or counter."
+            "rate_missing", f"{entry}: give rate_hz (samples per second), time_column or counter."
         )
     if spec.quat_order is None and any(c.quat for c in spec.columns.values()):
-        raise ManifestError("manifest_bad_value", f"{where}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
+        raise ManifestError("manifest_bad_value", f"{entry}: quat columns need quat_order, 'wxyz' or 'xyzw'.")
 
 
 def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, str, float]:
-    """Ticks of every row, what they are, and the smallest unit of a clock in s (see `Draft`)."""
+    """Ticks of every row, their kind, and the smallest unit of a clock in s (see `Draft`)."""
     if spec.counter is not None:
         counts = table.values[spec.counter.column]
         _check_counter(counts, spec.counter, source)
@@ -251,9 +253,11 @@ def _time(table: text.Columns, spec: SourceSpec, source: str) -> tuple[Floats, s
         return np.arange(n, dtype=np.float64), "index", 0.0
     scale = _find_scale(table, spec, source)
     values = table.values[spec.time_column]
-    known = values[np.isfinite(values)][:_ROWS_OF_TICKS]
+    finite_values = values[np.isfinite(values)][:_ROWS_OF_TICKS]
     whole = (
-        bool(len(known)) and spec.time_column not in table.times and bool((known == np.round(known)).all())
+        bool(len(finite_values))
+        and spec.time_column not in table.times
+        and bool((finite_values == np.round(finite_values)).all())
     )
     return values * scale, "device", scale if whole else 0.0
 

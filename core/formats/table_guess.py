@@ -99,7 +99,7 @@ def look_into_table(file: SourceFile) -> TableLook | None:
     first = squeeze(lines[rows_from])
     titles = find_titles([squeeze(x) for x in lines[skip:rows_from]], first, separator, spec)
     names = text.number_columns(titles)
-    shown = [
+    preview = [
         text.split(squeeze(line), separator) for line in lines[rows_from : rows_from + SHOWN] if line.strip()
     ]
     values = _values(data, rows_from, separator, names, shape.decimal_comma)
@@ -113,25 +113,25 @@ def look_into_table(file: SourceFile) -> TableLook | None:
     source |= _signals(names, _fill_titles(lines[skip:rows_from], separator, titles), values.values, kind)
     if not header and not source["columns"]:
         source |= _by_values(names, values, source.get("time_column"))
-    return TableLook(tuple(names), tuple(tuple(c[:_CELL] for c in row) for row in shown), source)
+    return TableLook(tuple(names), tuple(tuple(c[:_CELL] for c in row) for row in preview), source)
 
 
 def make_entry(source: Mapping[str, Any], name: str) -> dict[str, Any]:
     """The entry of `sources` for one file with that layout; raises ManifestError without columns."""
-    said = source.get("columns")
-    if not isinstance(said, Mapping) or not said:
+    column_groups = source.get("columns")
+    if not isinstance(column_groups, Mapping) or not column_groups:
         raise ManifestError(
             "manifest_bad_value", f"No column of {name} is said to be acceleration; name its x, y and z."
         )
     columns = {
         (segment_in(name) or stem_of(name)) if sensor == THE_FILE else sensor: group
-        for sensor, group in said.items()
+        for sensor, group in column_groups.items()
     }
     return {**source, "file": name, "columns": columns}
 
 
 def guess_entry(file: SourceFile) -> dict[str, Any] | None:
-    """The entry of `sources` for a table that says everything itself; None where something is left to ask."""
+    """Entry of `sources` for a self-describing table; None if any required item is missing."""
     look = look_into_table(file)
     if look is None:
         return None
@@ -194,10 +194,10 @@ def _values(data: bytes, rows_from: int, separator: bytes, names: Sequence[str],
         return text.Columns({}, ())
 
 
-def _clock(names: Sequence[str], table: text.Columns, before: str) -> dict[str, Any]:
+def _clock(names: Sequence[str], table: text.Columns, preamble: str) -> dict[str, Any]:
     """Time source: a clock, else a counter, else a rate alone; and the rate if it can be determined."""
     values = table.values
-    rate = next((float(a or b) for a, b in _RATE.findall(before) if 1.0 <= float(a or b) <= 10_000.0), None)
+    rate = next((float(a or b) for a, b in _RATE.findall(preamble) if 1.0 <= float(a or b) <= 10_000.0), None)
     constant: dict[str, Any] = {}
     for name in names:
         if name in table.times:
@@ -211,12 +211,12 @@ def _clock(names: Sequence[str], table: text.Columns, before: str) -> dict[str, 
         with suppress(ManifestError):
             tick = find_tick(name, column, rate, "")
             return {"time_column": name, "time_unit": _UNIT_OF.get(tick, tick)}
-    found: dict[str, Any] = {} if rate is None else {"rate_hz": rate}
+    clock: dict[str, Any] = {} if rate is None else {"rate_hz": rate}
     for name in names:
         steps = np.diff(values.get(name, np.zeros(0)))
         if _COUNTER.fullmatch(name.rsplit("/", 1)[-1]) and len(steps) > 2 and np.median(steps) == 1.0:
-            return {**found, "counter": {"column": name}}
-    return found or constant
+            return {**clock, "counter": {"column": name}}
+    return clock or constant
 
 
 def _fill_titles(header: Sequence[bytes], separator: bytes, titles: Sequence[str]) -> list[str]:
@@ -231,9 +231,9 @@ def _fill_titles(header: Sequence[bytes], separator: bytes, titles: Sequence[str
             last = cell or last
             out.append(last)
         filled.append(out)
-    below = [*rows[-1], *[""] * (len(titles) - len(rows[-1]))]
+    last_row = [*rows[-1], *[""] * (len(titles) - len(rows[-1]))]
     return [
-        "/".join(p for p in (*(row[i] for row in filled), below[i]) if p) if below[i] else titles[i]
+        "/".join(p for p in (*(row[i] for row in filled), last_row[i]) if p) if last_row[i] else titles[i]
         for i in range(len(titles))
     ]
 
@@ -257,15 +257,15 @@ def _signals(
     """
     groups: dict[str, dict[str, dict[str, str]]] = {}
     units: dict[str, set[str]] = {"acc": set(), "gyr": set()}
-    seen: Counter[str] = Counter()
-    for name, title in sorted(zip(names, titles, strict=True), key=lambda both: not names_quantity(both[1])):
-        found = read_name(title, file_kind)
-        if found is None:
+    title_count: Counter[str] = Counter()
+    for name, title in sorted(zip(names, titles, strict=True), key=lambda pair: not names_quantity(pair[1])):
+        parts = read_name(title, file_kind)
+        if parts is None:
             continue
-        sensor, kind, axis, unit = found
+        sensor, kind, axis, unit = parts
         if titles.count(title) > 1:
-            seen[title] += 1
-            sensor = f"{sensor or 'sensor'} {seen[title]}"
+            title_count[title] += 1
+            sensor = f"{sensor or 'sensor'} {title_count[title]}"
         groups.setdefault(sensor, {}).setdefault(kind, {}).setdefault(axis, name)
         like = "acc" if kind in ("linear", "gravity") else kind
         if unit and like in units:
@@ -310,20 +310,20 @@ def _lacks_gravity(group: Mapping[str, Sequence[str]], values: Mapping[str, Floa
     )
 
 
-def _only(found: set[str], known: Mapping[str, float]) -> str | None:
-    return next(iter(found)) if len(found) == 1 and next(iter(found)) in known else None
+def _only(units: set[str], factors: Mapping[str, float]) -> str | None:
+    return next(iter(units)) if len(units) == 1 and next(iter(units)) in factors else None
 
 
 def _norms(
     columns: Mapping[str, Mapping[str, Sequence[str]]], kind: str, values: Mapping[str, Floats]
 ) -> Floats:
     """Norms of one quantity over all sensors."""
-    found = [
+    norms = [
         np.linalg.norm(np.stack([values[c] for c in group[kind]], axis=1), axis=1)
         for group in columns.values()
         if kind in group and all(c in values for c in group[kind])
     ]
-    joined = np.concatenate(found) if found else np.zeros(0)
+    joined = np.concatenate(norms) if norms else np.zeros(0)
     return joined[np.isfinite(joined)]
 
 

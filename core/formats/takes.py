@@ -69,16 +69,16 @@ def _of_folder(root: Path, folder: Path, paths: Sequence[Path]) -> list[FoundTak
             loose.append(path)
     for name, own in _by_name(loose).items():
         groups.setdefault(name, []).extend(own)
-    beside = [p for p in paths if kinds[p] == "mapping"]
+    mappings = [p for p in paths if kinds[p] == "mapping"]
     takes = []
     for name, own in groups.items():
         sidecars = [part for p in own if bids.is_table(p.name) for part in bids.find_parts(p.name)]
-        parts = [*own, *beside, *(p for p in paths if p.name in sidecars)]
+        parts = [*own, *mappings, *(p for p in paths if p.name in sidecars)]
         manifest = _manifest_of(root, folder)
         if manifest is not None and not any(is_zip(_head(p)) for p in own):
             parts.append(manifest)
-        at = folder.relative_to(root).as_posix()
-        full = "/".join(part for part in ("" if at == "." else at, name) if part)
+        folder_name = folder.relative_to(root).as_posix()
+        full = "/".join(part for part in ("" if folder_name == "." else folder_name, name) if part)
         takes.append(FoundTake(full or root.name, tuple(parts), dict(_ENTITY.findall(name))))
     return takes
 
@@ -97,10 +97,10 @@ def _by_name(paths: Sequence[Path]) -> dict[str, list[Path]]:
 
 def _manifest_of(root: Path, folder: Path) -> Path | None:
     """The manifest of a folder, or of the nearest parent within the study."""
-    for at in (folder, *folder.parents):
-        if (found := at / MANIFEST).is_file():
-            return found
-        if at == root:
+    for ancestor in (folder, *folder.parents):
+        if (manifest := ancestor / MANIFEST).is_file():
+            return manifest
+        if ancestor == root:
             break
     return None
 

@@ -71,29 +71,29 @@ def is_text(data: bytes) -> bool:
 def head_lines(data: bytes, most: int = 64) -> list[bytes]:
     """First lines without line ends; lines longer than 1 MB are truncated."""
     lines: list[bytes] = []
-    at = 0
-    while len(lines) < most and at < len(data):
-        end = data.find(b"\n", at, at + _LONGEST_LINE)
+    position = 0
+    while len(lines) < most and position < len(data):
+        end = data.find(b"\n", position, position + _LONGEST_LINE)
         end = len(data) if end < 0 else end
-        lines.append(data[at:end].rstrip(b"\r"))
-        at = end + 1
+        lines.append(data[position:end].rstrip(b"\r"))
+        position = end + 1
     return lines
 
 
 def read_separator(first: bytes) -> bytes | None:
     """Separator from a first line "sep=,", None without one; a tab may be written as an escape sequence."""
-    found = re.match(rb'"?sep=(\\t|[,;\t|])', first)
-    return None if found is None else b"\t" if found[1] == rb"\t" else found[1]
+    separator_match = re.match(rb'"?sep=(\\t|[,;\t|])', first)
+    return None if separator_match is None else b"\t" if separator_match[1] == rb"\t" else separator_match[1]
 
 
 def after_lines(data: bytes, n: int) -> memoryview:
     """The data after the first n lines, without a copy."""
-    at = 0
+    position = 0
     for _ in range(n):
-        at = data.find(b"\n", at) + 1
-        if at == 0:
+        position = data.find(b"\n", position) + 1
+        if position == 0:
             return memoryview(b"")
-    return memoryview(data)[at:]
+    return memoryview(data)[position:]
 
 
 def split(line: bytes, separator: bytes) -> list[str]:
@@ -126,30 +126,30 @@ def read_columns(
     source: str,
     separator: bytes,
     names: Sequence[str],
-    wanted: Sequence[str],
+    selection: Sequence[str],
     *,
     decimal_comma: bool,
     times: Sequence[str] = (),
 ) -> Columns:
-    """Read the wanted columns of a table without its header.
+    """Read selected columns of a table without its header.
 
     Parameters
     ----------
-    body : rows, starting at a line start. names : titles of all columns in order. wanted : some of them, or
-        names that `number_columns` gives them. times : those of them that may hold dates or times of day as
-        text, which are read as seconds.
+    body : rows, starting at a line start. names : titles of all columns in order. selection : some of them,
+        or names that `number_columns` gives them. times : those of them that may hold dates or times of day
+        as text, which are read as seconds.
 
     Raises
     ------
     FormatError bad_table if most rows do not have the columns of the header, ambiguous_column if several
-        columns have a wanted title.
+        columns have a selected title.
     """
     titles, names = names, number_columns(names)
-    _check_titles(titles, names, wanted, source)
+    _check_titles(titles, names, selection, source)
     if not bytes(body[:_HEAD]).strip():
         raise FormatError("empty", f"{source} has a header but no samples; record or export it again.")
     texts = [name for name in times if _holds_times(body, separator, list(names).index(name))]
-    table = _Table(_as_utf8(body), separator, names, wanted, decimal_comma, texts)
+    table = _Table(_as_utf8(body), separator, names, selection, decimal_comma, texts)
     values, rows, notices = _read_values(table, source)
     notices += _check_rows(rows, table.broken, len(names), source)
     return Columns(values, tuple(notices), frozenset(texts))
@@ -158,8 +158,8 @@ def read_columns(
 def _holds_times(body: memoryview, separator: bytes, column: int) -> bool:
     """Whether the first cells of a column are dates or times of day."""
     rows = [split(line, separator) for line in head_lines(bytes(body[:_HEAD]), _FIRST_ROWS)]
-    found = [row[column] for row in rows if len(row) > column and row[column] not in MISSING]
-    return bool(found) and sum(looks_like_time(cell) for cell in found) > len(found) / 2
+    sample_cells = [row[column] for row in rows if len(row) > column and row[column] not in MISSING]
+    return bool(sample_cells) and sum(looks_like_time(cell) for cell in sample_cells) > len(sample_cells) / 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +207,9 @@ class _Table:
         return "skip"
 
 
-def _check_titles(titles: Sequence[str], names: Sequence[str], wanted: Sequence[str], source: str) -> None:
-    """Raise `ambiguous_column` if several columns have a wanted title."""
-    for name in wanted:
+def _check_titles(titles: Sequence[str], names: Sequence[str], selection: Sequence[str], source: str) -> None:
+    """Raise `ambiguous_column` if several columns have a selected title."""
+    for name in selection:
         if name not in names and name in titles:
             raise FormatError(
                 "ambiguous_column",
@@ -223,24 +223,24 @@ def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, li
     """The wanted columns, the number of rows, and notices of lines and cells that are no numbers."""
     notices: list[Notice] = []
     try:
-        found = table.read(pa.float64())
-        again = 0
+        data = table.read(pa.float64())
+        header_repeats = 0
     except pa.ArrowInvalid:
         try:
-            found = table.read(pa.string())
+            data = table.read(pa.string())
         except pa.ArrowInvalid as e:
             raise FormatError("bad_table", f"{source} is not a readable table ({e}); export it again.") from e
-        found, again, bad = _as_numbers(found, table)
+        data, header_repeats, bad = _as_numbers(data, table)
         if bad:
             notices.append(
                 Notice(
                     "bad_cells",
                     f"{source}: {bad} cells are not numbers and count as missing; the export may be damaged.",
-                    severity=grade_loss(bad, len(found) * len(table.wanted)),
+                    severity=grade_loss(bad, len(data) * len(table.wanted)),
                 )
             )
-    if again or table.others:
-        lines = again + len(table.others)
+    if header_repeats or table.others:
+        lines = header_repeats + len(table.others)
         notices.append(
             Notice(
                 "lines_without_values",
@@ -250,15 +250,15 @@ def _read_values(table: _Table, source: str) -> tuple[dict[str, Floats], int, li
                 severity="info",
             )
         )
-    values = {n: parse_times(found[n]) if n in table.texts else _as_floats(found[n]) for n in table.wanted}
-    return values, len(found), notices
+    values = {n: parse_times(data[n]) if n in table.texts else _as_floats(data[n]) for n in table.wanted}
+    return values, len(data), notices
 
 
-def _as_numbers(found: pa.Table, table: _Table) -> tuple[pa.Table, int, int]:
+def _as_numbers(data: pa.Table, table: _Table) -> tuple[pa.Table, int, int]:
     """Text cells as numbers, without rows of texts alone; how many these are, and other bad cells."""
-    columns, bad = [], np.zeros(len(found), np.int64)
+    columns, bad = [], np.zeros(len(data), np.int64)
     for name in table.wanted:
-        cells = found[name]
+        cells = data[name]
         if name in table.texts:
             columns.append(cells)
             continue
@@ -328,13 +328,13 @@ def number_columns(titles: Sequence[str]) -> list[str]:
     """
     titles = [title or f"column {i}" for i, title in enumerate(titles, 1)]
     counts, used = Counter(titles), set(titles)
-    seen: Counter[str] = Counter()
+    title_count: Counter[str] = Counter()
     names = []
     for title in titles:
         name = title
         if counts[title] > 1:
-            seen[title] += 1
-            name = f"{title}#{seen[title]}"
+            title_count[title] += 1
+            name = f"{title}#{title_count[title]}"
             while name in used:  # some other column has this as its own title
                 name += "#"
             used.add(name)
@@ -347,11 +347,17 @@ def describe_columns(titles: Sequence[str], title: str) -> str:
     names = number_columns(titles)
     listed = []
     for i in [i for i, t in enumerate(titles) if t == title]:
-        before, after = names[i - 1] if i else None, names[i + 1] if i + 1 < len(names) else None
-        if before and after:
-            where = f", between '{before}' and '{after}'"
+        previous_title, next_title = names[i - 1] if i else None, names[i + 1] if i + 1 < len(names) else None
+        if previous_title and next_title:
+            context = f", between '{previous_title}' and '{next_title}'"
         else:
-            where = f", before '{after}'" if after else f", after '{before}'" if before else ""
-        listed.append(f"'{names[i]}' (column {i + 1}{where})")
+            context = (
+                f", before '{next_title}'"
+                if next_title
+                else f", after '{previous_title}'"
+                if previous_title
+                else ""
+            )
+        listed.append(f"'{names[i]}' (column {i + 1}{context})")
     more = f" and {len(listed) - MOST_LISTED} more" if len(listed) > MOST_LISTED else ""
     return ", ".join(listed[:MOST_LISTED]) + more

@@ -30,17 +30,17 @@ def anatomical_curves(curves: CycleCurves, standing_deg: Mapping[str, float]) ->
     ParameterError as `check_standing`.
     """
     check_standing(standing_deg)
-    found: dict[str, dict[Side, Floats]] = {}
+    relative_curves: dict[str, dict[Side, Floats]] = {}
     bounds: dict[str, dict[Side, float]] = {}
     for variable, sides in curves.curves.items():
         for side, rows in sides.items():
             if standing_name(variable, side) not in standing_deg:
                 continue
             offset = float(np.radians(standing_offset_deg(variable, side, standing_deg)))
-            found.setdefault(variable, {})[side] = rows + offset
+            relative_curves.setdefault(variable, {})[side] = rows + offset
             if (bound := curves.bounds.get(variable, {}).get(side)) is not None:
                 bounds.setdefault(variable, {})[side] = bound + offset
-    return replace(curves, curves=found, bounds=bounds)
+    return replace(curves, curves=relative_curves, bounds=bounds)
 
 
 def standing_name(variable: str, side: Side) -> str:
@@ -63,14 +63,14 @@ def anatomical_parameters(curves: CycleCurves, standing_deg: Mapping[str, float]
     repeated.
     """
     level, figures = anatomical_curves(curves, standing_deg), list_curve_figures()
-    found = tuple(
+    parameters = tuple(
         p
         for p in summarise_angles(level)
         if p.side is not None
         and is_level(p.name)
         and p.side in level.curves.get(figures[p.name].variable, {})
     )
-    return state_uncertainty(found, goniometer=True)
+    return state_uncertainty(parameters, goniometer=True)
 
 
 def anatomical_variables(standing_deg: Mapping[str, float]) -> tuple[str, ...]:

@@ -45,27 +45,29 @@ class Flats:
 
 def find_flats(strides: Strides, feet: FootTracks) -> Flats:
     """Foot-flat after every initial contact that begins, ends or falls within a stride."""
-    of = strides.columns
-    stance = STANCE_SHARE * of.duration_s
-    off = np.where(np.isnan(of.tc_s), of.start_s + stance, of.tc_s)
+    stride_columns = strides.columns
+    stance = STANCE_SHARE * stride_columns.duration_s
+    off = np.where(np.isnan(stride_columns.tc_s), stride_columns.start_s + stance, stride_columns.tc_s)
     first, last, opposite = np.full((3, len(off)), -1)
     for side in feet.p:
-        own, other = of.of[side], of.of[OTHER[side]]
+        own, other_rows = stride_columns.of[side], stride_columns.of[OTHER[side]]
         # contacts of this foot within the list, each once per stride that ends or crosses with it
-        landed = of.opposite_ic_s.copy()
-        landed[own] = of.end_s[own]
-        told = np.flatnonzero(~np.isnan(landed))
-        times, at = np.unique(np.concatenate((landed[told], of.start_s[own])), return_inverse=True)
+        landed = stride_columns.opposite_ic_s.copy()
+        landed[own] = stride_columns.end_s[own]
+        landed_rows = np.flatnonzero(~np.isnan(landed))
+        times, inverse = np.unique(
+            np.concatenate((landed[landed_rows], stride_columns.start_s[own])), return_inverse=True
+        )
         until = np.full(len(times), np.inf)
         # the first stride in the list counts
-        until[at[: len(told)][::-1]] = (landed + stance)[told][::-1]
+        until[inverse[: len(landed_rows)][::-1]] = (landed + stance)[landed_rows][::-1]
         # the stride before tells how long a stance is, where a small step in a turn was not found
-        np.minimum.at(until, at[len(told) :], off[own])
-        found = _longest(feet, side, *np.searchsorted(feet.t_s, np.stack((times, until))))
-        first[own] = found[at[len(told) :]]
+        np.minimum.at(until, inverse[len(landed_rows) :], off[own])
+        flat_index = _longest(feet, side, *np.searchsorted(feet.t_s, np.stack((times, until))))
+        first[own] = flat_index[inverse[len(landed_rows) :]]
         place = np.full(len(off), -1)
-        place[told] = found[at[: len(told)]]
-        last[own], opposite[other] = place[own], place[other]
+        place[landed_rows] = flat_index[inverse[: len(landed_rows)]]
+        last[own], opposite[other_rows] = place[own], place[other_rows]
     return Flats(first, last, opposite)
 
 
@@ -75,11 +77,11 @@ def _longest(
     """Middle (m,) of a foot's longest rest within each range [first, past), −1 without any."""
     runs = np.array(find_runs(feet.still[side] & feet.valid[side]), np.intp).reshape(-1, 2)
     starts, stops = runs.T
-    at, end = np.searchsorted(stops, first, "right"), np.searchsorted(starts, past, "left")
+    position, end = np.searchsorted(stops, first, "right"), np.searchsorted(starts, past, "left")
     best, middle = np.zeros(len(first), np.intp), np.full(len(first), -1)
-    while len(left := np.flatnonzero(at < end)):
-        a, b = np.maximum(starts[at[left]], first[left]), np.minimum(stops[at[left]], past[left])
+    while len(left := np.flatnonzero(position < end)):
+        a, b = np.maximum(starts[position[left]], first[left]), np.minimum(stops[position[left]], past[left])
         longer = b - a > best[left]
         best[left[longer]], middle[left[longer]] = (b - a)[longer], (a + b)[longer] // 2
-        at[left] += 1
+        position[left] += 1
     return middle

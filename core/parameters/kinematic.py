@@ -64,7 +64,7 @@ def cycle_curves(angles: JointAngles, strides: Strides) -> CycleCurves:
     """
     curves: dict[str, dict[Side, Floats]] = {}
 
-    def keep(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
+    def keep(cycles: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
         curves.setdefault(variable, {})[side] = rows
 
     return replace(read_cycles(angles, strides, keep), curves=curves)
@@ -78,15 +78,15 @@ def measure_cycles(
     The curves themselves are discarded once read and are not included: for an hour they are as large as its
     signals.
     """
-    figures, found = list_curve_figures(), dict[str, dict[Side, Floats]]()
+    figures, values_by_figure = list_curve_figures(), dict[str, dict[Side, Floats]]()
 
-    def read(known: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
+    def read(cycles: CycleCurves, variable: str, side: Side, rows: Floats) -> None:
         for name, figure in figures.items():
             if figure.variable == variable:
-                found.setdefault(name, {})[side] = _read_figure(figure, rows)
+                values_by_figure.setdefault(name, {})[side] = _read_figure(figure, rows)
 
-    known = read_cycles(angles, strides, read)
-    return known, {name: found[name] for name in figures if name in found}
+    cycles = read_cycles(angles, strides, read)
+    return cycles, {name: values_by_figure[name] for name in figures if name in values_by_figure}
 
 
 def read_cycles(
@@ -104,22 +104,22 @@ def read_cycles(
     -------
     The metadata of the curves.
     """
-    of = strides.columns
-    foot_off = 100.0 * (of.tc_s - of.start_s) / of.duration_s
+    stride_columns = strides.columns
+    foot_off = 100.0 * (stride_columns.tc_s - stride_columns.start_s) / stride_columns.duration_s
     ends: dict[str, dict[Side, float]] = {}
-    why = _tell_withheld(angles.withheld)
-    known = CycleCurves(
+    reasons = _tell_withheld(angles.withheld)
+    cycles = CycleCurves(
         curves={},
-        stride_index={side: tuple(own.tolist()) for side, own in of.of.items()},
-        used={side: of.counted[own] for side, own in of.of.items()},
-        foot_off_pct={side: foot_off[own] for side, own in of.of.items()},
-        why=why,
+        stride_index={side: tuple(own.tolist()) for side, own in stride_columns.of.items()},
+        used={side: stride_columns.counted[own] for side, own in stride_columns.of.items()},
+        foot_off_pct={side: foot_off[own] for side, own in stride_columns.of.items()},
+        why=reasons,
         bounds=ends,
         zero=angles.zero,
     )
     for side in SIDES:
-        own = of.of[side]
-        bounds = np.stack((of.start_s[own], of.end_s[own]), axis=1)
+        own = stride_columns.of[side]
+        bounds = np.stack((stride_columns.start_s[own], stride_columns.end_s[own]), axis=1)
         names = _name_variables(angles.angles, side)
         courses = {
             variable: angles.headings[segment]
@@ -130,7 +130,7 @@ def read_cycles(
         rows = resample_in_turn(signals, angles.t_s, bounds, POINTS)
         for variable, row in zip(courses, rows):  # noqa: B905 - the angles follow
             row -= row[:, :-1].mean(axis=1, keepdims=True)
-            take(known, variable, side, np.negative(row, out=row) if side == "left" else row)
+            take(cycles, variable, side, np.negative(row, out=row) if side == "left" else row)
         for (name, base), row in zip(names.items(), rows, strict=True):
             sign = -1.0 if name == "pelvis_obliquity" and side == "left" else 1.0
             # from the mean of walking nobody knows where straight is
@@ -139,23 +139,23 @@ def read_cycles(
                 torn = (row < least).any(axis=1)
                 row = np.where(torn[:, None], np.nan, row)
                 if torn.any():
-                    why.setdefault(base, {})[side] = IMPOSSIBLE
+                    reasons.setdefault(base, {})[side] = IMPOSSIBLE
             row *= sign
             if name in angles.bounds:
                 ends.setdefault(base, {})[side] = angles.bounds[name]
-            take(known, base, side, row)
-    return known
+            take(cycles, base, side, row)
+    return cycles
 
 
 def _tell_withheld(withheld: Mapping[str, str]) -> dict[str, dict[Side, str]]:
     """Variable → side → reason for suppression."""
-    why: dict[str, dict[Side, str]] = {}
+    reasons: dict[str, dict[Side, str]] = {}
     for name, reason in withheld.items():
         base, _, suffix = name.rpartition("_")
         own_sides = [s for s in SIDES if SUFFIX[s] == suffix]
         for side in own_sides or SIDES:
-            why.setdefault(base if own_sides else name, {})[side] = reason
-    return why
+            reasons.setdefault(base if own_sides else name, {})[side] = reason
+    return reasons
 
 
 def _name_variables(angles: Iterable[str], side: Side) -> dict[str, str]:
@@ -288,19 +288,19 @@ def summarise_angles(
         used = curves.used[side]
         for name, sides in figures.items():
             variable = read[name].variable if name in read else name
-            why = curves.why.get(variable, {}).get(side)
+            suppression = curves.why.get(variable, {}).get(side)
             if side not in sides:
-                reason = why or "joint_missing"
+                reason = suppression or "joint_missing"
                 values = np.empty(0)
             elif curves.zero == "walking" and is_level(name):
                 reason, values = NO_STANDING, np.empty(0)
             else:
-                reason = (why or "gap") if used.any() else "no_strides"
-                counted = sides[side][used]
-                resting = _at_bound(curves, name, side, counted)
-                if np.count_nonzero(resting) > MOST * len(counted):
-                    reason, counted = AT_BOUND, counted[:0]
-                values = counted[np.isfinite(counted)]
+                reason = (suppression or "gap") if used.any() else "no_strides"
+                used_values = sides[side][used]
+                resting = _at_bound(curves, name, side, used_values)
+                if np.count_nonzero(resting) > MOST * len(used_values):
+                    reason, used_values = AT_BOUND, used_values[:0]
+                values = used_values[np.isfinite(used_values)]
             parameters.append(summarise_values(name, side, values, "deg", reason))
     return tuple(parameters)
 

@@ -123,9 +123,9 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
         core/events/edits.py.
     """
     events = apply_event_edits(tracks.events, edits, tracks.duration_s)
-    found = stride_list(events, tracks, tracks.turning, tracks.params)
-    flats = None if tracks.feet is None else find_flats(found, tracks.feet)
-    strides = apply_stride_edits(_walked(tracks, found, flats), edits)
+    detected_strides = stride_list(events, tracks, tracks.turning, tracks.params)
+    flats = None if tracks.feet is None else find_flats(detected_strides, tracks.feet)
+    strides = apply_stride_edits(_walked(tracks, detected_strides, flats), edits)
     figures = take_figures(strides, tracks.angles, tracks, tracks.feet, tracks.surface, tracks.trunk, flats)
     # contacts, found or set by a person, say more than the trunk
     steps = None if events.events else tracks.steps
@@ -136,7 +136,9 @@ def measure_gait(tracks: Tracks, edits: Sequence[Edit] = ()) -> MeasuredGait:
     first = figures.parameters if steps is None else _of_steps(tracks, steps, figures.parameters)
     estimated = () if tracks.angles is None else tracks.angles.estimated
     first = state_uncertainty(first, events, estimated, feet_lag_s=_find_feet_lag(tracks, events))
-    doubts = tracks.doubts + judge_feet(events, strides, bouts, lambda s, at: _is_measured(tracks, s, at))
+    doubts = tracks.doubts + judge_feet(
+        events, strides, bouts, lambda s, times_s: _is_measured(tracks, s, times_s)
+    )
     if doubts:
         strides = replace(strides, notices=(*strides.notices, *(x.notice for x in doubts)))
     parameters = withhold_doubtful(first + bout_parameters(bouts) + turn_parameters(tracks.turns), doubts)
@@ -160,12 +162,12 @@ def _find_feet_lag(tracks: Tracks, events: GaitEvents) -> float:
     return abs(measure_foot_lag(events, AlternationParams()) or 0.0)
 
 
-def _walked(tracks: Tracks, found: Strides, flats: Flats | None) -> Strides:
+def _walked(tracks: Tracks, detected_strides: Strides, flats: Flats | None) -> Strides:
     """The stride list, without strides in place if the paths of the feet are known."""
-    marching = in_place(found, tracks.feet, tracks.surface, flats).tolist()
+    marching = in_place(detected_strides, tracks.feet, tracks.surface, flats).tolist()
     if not marching:
-        return found
-    listed = list(found.strides)
+        return detected_strides
+    listed = list(detected_strides.strides)
     for i in marching:
         listed[i] = add_flag(listed[i], "in_place")
     return count_strides(listed, tracks.params)
@@ -175,6 +177,6 @@ def _of_steps(tracks: Tracks, steps: Steps, figures: tuple[Parameter, ...]) -> t
     """Parameters from the trunk; in addition missing ones of foot sensors that gave no contacts, with
     their reasons.
     """
-    told = (*step_parameters(steps), *_regular(tracks, steps))
-    known = {(p.name, p.side) for p in told}
-    return told + tuple(p for p in figures if tracks.q and (p.name, p.side) not in known)
+    trunk_parameters = (*step_parameters(steps), *_regular(tracks, steps))
+    keys = {(p.name, p.side) for p in trunk_parameters}
+    return trunk_parameters + tuple(p for p in figures if tracks.q and (p.name, p.side) not in keys)

@@ -55,24 +55,26 @@ def measure_phases(
     "no_terminal_stance" if the heel rises outside single support; "feet_not_adjacent", "tibia_not_vertical"
     if the swing has no such moment, or not in this order.
     """
-    found = (*_stance(strides, stances), *_swing(strides, angles, pitch, feet))
-    return dict(zip(NAMES, found, strict=True))
+    figures = (*_stance(strides, stances), *_swing(strides, angles, pitch, feet))
+    return dict(zip(NAMES, figures, strict=True))
 
 
 def _stance(strides: Strides, stances: Stances) -> tuple[Figure, Figure]:
     """Mid and terminal stance: single support before and after heel rise."""
-    of = strides.columns
-    heel_off, begins, ends = stances.heel_off_s, of.opposite_tc_s, of.opposite_ic_s
-    percent = 100.0 / of.duration_s
+    stride_columns = strides.columns
+    heel_off, begins, ends = stances.heel_off_s, stride_columns.opposite_tc_s, stride_columns.opposite_ic_s
+    percent = 100.0 / stride_columns.duration_s
     single = percent * (ends - begins)
     mid = percent * (heel_off - begins)
     early, late = heel_off <= begins, heel_off >= ends
-    alone = np.isnan(begins) | np.isnan(ends)
-    why = np.where(alone, np.array("opposite_foot_missing", object), stances.parts["push_pct"].reasons)
-    no_mid, no_end = why.copy(), why.copy()
-    no_mid[early & ~alone], no_end[late & ~early & ~alone] = "no_mid_stance", "no_terminal_stance"
+    no_opposite = np.isnan(begins) | np.isnan(ends)
+    push_reasons = np.where(
+        no_opposite, np.array("opposite_foot_missing", object), stances.parts["push_pct"].reasons
+    )
+    no_mid, no_end = push_reasons.copy(), push_reasons.copy()
+    no_mid[early & ~no_opposite], no_end[late & ~early & ~no_opposite] = "no_mid_stance", "no_terminal_stance"
     return (
-        tell_figure(np.where(alone | early, np.nan, np.where(late, single, mid)), no_mid),
+        tell_figure(np.where(no_opposite | early, np.nan, np.where(late, single, mid)), no_mid),
         tell_figure(np.where(early, single, np.where(late, np.nan, single - mid)), no_end),
     )
 
@@ -81,7 +83,7 @@ def _swing(
     strides: Strides, angles: JointAngles | None, pitch: dict[Segment, Floats], feet: FootTracks | None
 ) -> tuple[Figure, Figure, Figure]:
     """Initial, mid and terminal swing, between foot-off, passing ankle, vertical tibia and contact."""
-    of = strides.columns
+    stride_columns = strides.columns
     adjacent, vertical = _adjacent(strides, feet), _vertical(strides, angles, pitch)
     vertical = np.where(vertical <= adjacent, np.nan, vertical)
     linked = feet is not None and feet.linked
@@ -89,15 +91,15 @@ def _swing(
     doubt = next(iter(feet.withheld.values()), None) if feet is not None and linked else None
     passed = np.full(len(vertical), doubt or ("feet_not_adjacent" if linked else "feet_not_linked"), object)
     upright = np.empty(len(vertical), object)
-    for side, own in of.of.items():
+    for side, own in stride_columns.of.items():
         upright[own] = _why_not_upright(side, angles)
-    no_off = np.isnan(of.tc_s)
+    no_off = np.isnan(stride_columns.tc_s)
     passed[no_off] = upright[no_off] = "no_terminal_contact"
-    percent = np.where(no_off, np.nan, 100.0 / of.duration_s)
+    percent = np.where(no_off, np.nan, 100.0 / stride_columns.duration_s)
     return (
-        tell_figure(percent * (adjacent - of.tc_s), passed),
+        tell_figure(percent * (adjacent - stride_columns.tc_s), passed),
         tell_figure(percent * (vertical - adjacent), np.where(np.isnan(adjacent), passed, upright)),
-        tell_figure(percent * (of.end_s - vertical), upright),
+        tell_figure(percent * (stride_columns.end_s - vertical), upright),
     )
 
 
@@ -118,9 +120,9 @@ def _swings(strides: Strides, own: NDArray[np.intp]) -> Floats:
 
 def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
     """Time (strides,) at which the swinging ankle passes the other, s; NaN if never or unknown."""
-    found = np.full(len(strides.strides), np.nan)
+    times = np.full(len(strides.strides), np.nan)
     if feet is None or not feet.linked or feet.withheld:
-        return found
+        return times
     for side in SIDES:
         own = strides.columns.of[side]
         if not len(own) or any(x not in feet.p for x in SIDES):
@@ -131,15 +133,15 @@ def _adjacent(strides: Strides, feet: FootTracks | None) -> Floats:
         x, y, other_x, other_y = resample(signals, feet.t_s, bounds, SWING_POINTS)
         along_x, along_y = x[:, -1:] - x[:, :1], y[:, -1:] - y[:, :1]
         ahead = (x - other_x) * along_x + (y - other_y) * along_y
-        found[own] = bounds[:, 0] + first_crossing(ahead) * (bounds[:, 1] - bounds[:, 0])
-    return found
+        times[own] = bounds[:, 0] + first_crossing(ahead) * (bounds[:, 1] - bounds[:, 0])
+    return times
 
 
 def _vertical(strides: Strides, angles: JointAngles | None, pitch: dict[Segment, Floats]) -> Floats:
     """Last time (strides,) at which the swinging tibia passes the vertical forwards, s; NaN if never or
     unknown.
     """
-    found = np.full(len(strides.strides), np.nan)
+    times = np.full(len(strides.strides), np.nan)
     for side in SIDES:
         ankle = None if angles is None else angles.angles.get(f"ankle_dorsiflexion_{SUFFIX[side]}")
         own = strides.columns.of[side]
@@ -147,5 +149,5 @@ def _vertical(strides: Strides, angles: JointAngles | None, pitch: dict[Segment,
             continue
         bounds = _swings(strides, own)
         lean = resample((pitch[FOOT[side]] - ankle)[None], angles.t_s, bounds, SWING_POINTS)[0]
-        found[own] = bounds[:, 0] + last_crossing(lean) * (bounds[:, 1] - bounds[:, 0])
-    return found
+        times[own] = bounds[:, 0] + last_crossing(lean) * (bounds[:, 1] - bounds[:, 0])
+    return times

@@ -35,8 +35,8 @@ def resample_in_turn(
     share -= low
     share[nowhere] = np.nan
     if len(bounds) == 1:  # a live stride: all signals at once
-        found = tuple(signals)
-        yield from _interpolate(np.stack(found), low, share) if found else ()
+        signal_list = tuple(signals)
+        yield from _interpolate(np.stack(signal_list), low, share) if signal_list else ()
         return
     for signal in signals:
         (rows,) = _interpolate(np.ascontiguousarray(signal)[None], low, share)
@@ -46,11 +46,11 @@ def resample_in_turn(
 
 def _interpolate(signals: Floats, low: NDArray[np.int64], share: Floats) -> Floats:
     """Signals (k, n) interpolated by a fraction between samples, as (k, pieces, points)."""
-    here, rows = signals.take(low, axis=1), signals[:, 1:].take(low, axis=1)
+    lower, rows = signals.take(low, axis=1), signals[:, 1:].take(low, axis=1)
     # in place: ten minutes of all angles are a million points
-    rows -= here
+    rows -= lower
     rows *= share
-    rows += here
+    rows += lower
     rows[~np.isfinite(rows.sum(axis=-1))] = np.nan
     return rows
 
@@ -78,8 +78,8 @@ def last_crossing(pieces: Floats) -> Floats:
 def _crossing(pieces: Floats, *, last: bool) -> Floats:
     m, points = pieces.shape
     up = (pieces[:, :-1] < 0.0) & (pieces[:, 1:] >= 0.0)
-    at = points - 2 - np.argmax(up[:, ::-1], axis=1) if last else np.argmax(up, axis=1)
+    index = points - 2 - np.argmax(up[:, ::-1], axis=1) if last else np.argmax(up, axis=1)
     each = np.arange(m)
-    a, b = pieces[each, at], pieces[each, at + 1]
+    a, b = pieces[each, index], pieces[each, index + 1]
     rise = np.where(up.any(axis=1), b - a, np.nan)
-    return np.asarray((at - a / rise) / (points - 1))
+    return np.asarray((index - a / rise) / (points - 1))

@@ -49,8 +49,8 @@ NO_REASON = np.array("", np.object_)
 
 def tell_figure(values: Floats, reasons: Codes | str) -> Figure:
     """Finite values (strides,), with reasons for the others, one each or one for all."""
-    known = np.isfinite(values)
-    return Figure(np.where(known, values, np.nan), np.where(known, NO_REASON, reasons))
+    finite = np.isfinite(values)
+    return Figure(np.where(finite, values, np.nan), np.where(finite, NO_REASON, reasons))
 
 
 def as_column(values: Floats) -> Column:

@@ -58,8 +58,10 @@ def stride_smoothness(strides: Sequence[Window], t_s: Floats, trunk: Mapping[Seg
     bounds = np.array(strides)
     pieces = resample(np.abs(force - GRAVITY)[None], t_s, bounds, POINTS + 1)[0][:, :-1]
     values = spectral_arc_length(pieces, (bounds[:, 1] - bounds[:, 0]) / POINTS)
-    known = values[np.isfinite(values)]
-    return summarise_values(NAME, None, known, "", "gap" if np.isfinite(force).any() else "no_forward")
+    finite_values = values[np.isfinite(values)]
+    return summarise_values(
+        NAME, None, finite_values, "", "gap" if np.isfinite(force).any() else "no_forward"
+    )
 
 
 def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
@@ -68,17 +70,17 @@ def spectral_arc_length(pieces: Floats, step_s: Floats) -> Floats:
     NaN if the signal is 0 throughout, not finite or sampled too coarsely for a spectrum.
     """
     n = PADDING * pieces.shape[1]
-    kept = int(np.ceil(LIMIT_HZ * n * float(np.max(step_s, initial=0.0)))) + 2
-    found = np.empty(len(pieces))
+    n_bins = int(np.ceil(LIMIT_HZ * n * float(np.max(step_s, initial=0.0)))) + 2
+    arc_lengths = np.empty(len(pieces))
     for first in range(0, len(pieces), AT_ONCE):
         part = slice(first, first + AT_ONCE)
-        found[part] = _measure_arcs(pieces[part], step_s[part], n, kept)
-    return found
+        arc_lengths[part] = _measure_arcs(pieces[part], step_s[part], n, n_bins)
+    return arc_lengths
 
 
-def _measure_arcs(pieces: Floats, step_s: Floats, n: int, kept: int) -> Floats:
+def _measure_arcs(pieces: Floats, step_s: Floats, n: int, n_bins: int) -> Floats:
     """SPARC of signals padded to n points, using this many frequencies."""
-    spectrum = np.abs(np.fft.rfft(pieces, n, axis=1)[:, :kept])
+    spectrum = np.abs(np.fft.rfft(pieces, n, axis=1)[:, :n_bins])
     dc = spectrum[:, :1]
     shape = spectrum / np.where(dc > 0.0, dc, np.nan)
     frequency = np.arange(shape.shape[1]) / (n * step_s[:, None])

@@ -44,7 +44,7 @@ from sagittal.core.signals.held_samples import give_pages_back
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import find_runs
 
-NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, of="stride"), "toe_out_deg")
+NAMES: Final[tuple[str, ...]] = (*list_names(DISTANCES, scope="stride"), "toe_out_deg")
 """Per-side parameters in the order of the tables."""
 
 STEP_M: Final = 0.05
@@ -114,7 +114,7 @@ def measure_distances(
                     for i, name in enumerate(NAMES):
                         values[i, part], reasons[i, part] = measured[name].values, measured[name].reasons
                 give_pages_back(path for s in feet.p for path in (feet.p[s], feet.q[s]))
-    return {name: Figure(*of) for name, *of in zip(NAMES, values, reasons, strict=True)}
+    return {name: Figure(*pair) for name, *pair in zip(NAMES, values, reasons, strict=True)}
 
 
 def in_place(
@@ -146,11 +146,11 @@ def summarise_distances(
     Parameters; without a value a reason: "no_strides", "estimator_bad" (both feet are suppressed), "path_bad"
     (this foot is) or the most frequent one of the strides.
     """
-    speed, *others = NAMES
+    speed, *foot_names = NAMES
     return (
         figure_parameter(speed, None, figures[speed], strides.columns.counted),
         _total(feet, surface),
-        *side_parameters(strides, {name: figures[name] for name in others}),
+        *side_parameters(strides, {name: figures[name] for name in foot_names}),
     )
 
 
@@ -164,10 +164,10 @@ def _total(feet: FootTracks | None, surface: Surface) -> Parameter:
     if feet is None:
         return summarise_values(name, None, [], "m", "no_foot_track")
     ways = []
-    told = {side: still for side, still in feet.still.items() if side not in feet.withheld}
-    if not told and feet.withheld:
+    still_feet = {side: still for side, still in feet.still.items() if side not in feet.withheld}
+    if not still_feet and feet.withheld:
         return summarise_values(name, None, [], "m", next(iter(feet.withheld.values())))
-    for side, still in told.items():
+    for side, still in still_feet.items():
         middles = [(start + stop) // 2 for start, stop in find_runs(still & feet.valid[side])]
         lengths = np.linalg.norm(np.diff(feet.p[side][middles, :2], axis=0), axis=1)
         if len(middles):
@@ -182,12 +182,12 @@ def _untold(n: int, reason: str) -> Figure:
 
 
 def _on_belt(strides: Strides, belt_mps: float | None) -> Figures:
-    found = {name: _untold(len(strides.strides), "treadmill") for name in NAMES}
+    figures = {name: _untold(len(strides.strides), "treadmill") for name in NAMES}
     if belt_mps is not None:
         duration = strides.columns.duration_s
-        found["gait_speed_mps"] = tell_figure(np.full(len(duration), belt_mps), "treadmill")
-        found["stride_length_m"] = tell_figure(belt_mps * duration, "treadmill")
-    return found
+        figures["gait_speed_mps"] = tell_figure(np.full(len(duration), belt_mps), "treadmill")
+        figures["stride_length_m"] = tell_figure(belt_mps * duration, "treadmill")
+    return figures
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,25 +231,25 @@ def _map(function: Callable[[float, float], float], x: Floats, y: Floats) -> Flo
 
 def _explain(flats: Flats, feet: FootTracks, foot: _Foot) -> Codes:
     """Why strides of a foot with these foot-flats have no distance, "" if they have one."""
-    known = (flats.first >= 0) & (flats.last >= 0)
-    first, last = np.where(known, flats.first, 0), np.where(known, flats.last, 0)
+    has_flats = (flats.first >= 0) & (flats.last >= 0)
+    first, last = np.where(has_flats, flats.first, 0), np.where(has_flats, flats.last, 0)
     short = _way(feet.p[foot.side], first, last)[2] < STEP_M
-    why = np.full(len(known), "", object)
-    why[short | (last <= first)] = "no_foot_flat"
-    why[short & (last > first)] = "in_place"
-    why[foot.patched[last + 1] > foot.patched[first]] = "packets_lost"
-    why[foot.lost[last + 1] > foot.lost[first]] = "gap"
-    why[~known] = "no_foot_flat"
+    codes = np.full(len(has_flats), "", object)
+    codes[short | (last <= first)] = "no_foot_flat"
+    codes[short & (last > first)] = "in_place"
+    codes[foot.patched[last + 1] > foot.patched[first]] = "packets_lost"
+    codes[foot.lost[last + 1] > foot.lost[first]] = "gap"
+    codes[~has_flats] = "no_foot_flat"
     if foot.side in feet.withheld:
-        why[:] = feet.withheld[foot.side]
-    return why
+        codes[:] = feet.withheld[foot.side]
+    return codes
 
 
 def _measure_side(
     strides: Strides, own: NDArray[np.intp], flats: Flats, feet: FootTracks, foot: _Foot
 ) -> Figures:
     """Values of some strides of one foot with a known length; `flats` are theirs."""
-    of, side, first, last = strides.columns, foot.side, flats.first, flats.last
+    stride_columns, side, first, last = strides.columns, foot.side, flats.first, flats.last
     x, y, length = _way(feet.p[side], first, last)
     along = np.stack((x / length, y / length), axis=1)
     mirror = 1.0 if side == "left" else -1.0
@@ -262,8 +262,8 @@ def _measure_side(
         "toe_out_deg": tell_figure(np.degrees(out), "gap")
         if feet.posture == "standing"
         else _untold(len(own), "no_standing"),
-        **_clearances(of.tc_s[own], of.end_s[own], feet, foot.heights, flats),
-        **_steps(of.opposite_ic_s[own], feet, side, flats, along, outward),
+        **_clearances(stride_columns.tc_s[own], stride_columns.end_s[own], feet, foot.heights, flats),
+        **_steps(stride_columns.opposite_ic_s[own], feet, side, flats, along, outward),
     }
 
 
@@ -293,7 +293,7 @@ def _clearances(
     swings = np.maximum(np.ceil((np.stack((tc_s, end_s)) - feet.t_s[0]) * feet.rate_hz) - spans.first, 0.0)
     stops = np.append(spans.start[1:], len(tip))
     for i in np.flatnonzero(~np.isnan(tc_s)).tolist():
-        a, b = (min(spans.start[i] + int(at), stops[i]) for at in swings[:, i])
+        a, b = (min(spans.start[i] + int(sample), stops[i]) for sample in swings[:, i])
         least = toe_clearance(tip[a:b])
         if isinstance(least, str):
             toe.reasons[i] = least
@@ -308,27 +308,27 @@ def _steps(
     landed_s: Floats, feet: FootTracks, side: Side, flats: Flats, along: Floats, outward: Floats
 ) -> Figures:
     """Steps at the end of the strides: from the other foot's foot-flat to this one's."""
-    other = OTHER[side]
-    why = np.full(len(landed_s), "", object)
-    why[flats.opposite < 0] = "no_foot_flat"
-    if other in feet.withheld:
-        why[:] = feet.withheld[other]
+    other_foot = OTHER[side]
+    codes = np.full(len(landed_s), "", object)
+    codes[flats.opposite < 0] = "no_foot_flat"
+    if other_foot in feet.withheld:
+        codes[:] = feet.withheld[other_foot]
     if not feet.linked:
-        why[:] = "feet_not_linked"
-    why[np.isnan(landed_s)] = "opposite_foot_missing"
-    if other not in feet.p:
-        why[:] = "opposite_foot_missing"
-    length, width = np.full((2, len(why)), np.nan)
-    told = np.flatnonzero(why == "")
-    if len(told):
-        x, y = (feet.p[side][flats.last[told], :2] - feet.p[other][flats.opposite[told], :2]).T
-        length[told] = x * along[told, 0] + y * along[told, 1]
-        width[told] = x * outward[told, 0] + y * outward[told, 1]
-        why[told] = "gap"
-    found = {"step_length_m": tell_figure(length, why), "step_width_m": tell_figure(width, why)}
+        codes[:] = "feet_not_linked"
+    codes[np.isnan(landed_s)] = "opposite_foot_missing"
+    if other_foot not in feet.p:
+        codes[:] = "opposite_foot_missing"
+    length, width = np.full((2, len(codes)), np.nan)
+    rows = np.flatnonzero(codes == "")
+    if len(rows):
+        x, y = (feet.p[side][flats.last[rows], :2] - feet.p[other_foot][flats.opposite[rows], :2]).T
+        length[rows] = x * along[rows, 0] + y * along[rows, 1]
+        width[rows] = x * outward[rows, 0] + y * outward[rows, 1]
+        codes[rows] = "gap"
+    figures = {"step_length_m": tell_figure(length, codes), "step_width_m": tell_figure(width, codes)}
     if feet.body.standing_width is None:
-        found["step_width_m"].values[told], found["step_width_m"].reasons[told] = (
+        figures["step_width_m"].values[rows], figures["step_width_m"].reasons[rows] = (
             np.nan,
             "standing_width_unknown",
         )
-    return found
+    return figures

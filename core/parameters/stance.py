@@ -49,14 +49,14 @@ class Stances:
 
 def foot_pitches(orientations: Oriented) -> dict[Segment, Floats]:
     """Foot → pitch (n,) in rad, toes up positive, 0 in standing; NaN where its sensor was lost."""
-    found: dict[Segment, Floats] = {}
+    pitches: dict[Segment, Floats] = {}
     for foot in FOOT.values():
         if foot in orientations.q:
             w, x, y, z = orientations.q[foot].T
             # how far the forward axis rises: the sine that events are found in (core/events/foot_pitch.py)
             angle = np.arcsin(np.clip(2.0 * (x * z - w * y), -1.0, 1.0))
-            found[foot] = np.where(orientations.valid[foot], angle, np.nan)
-    return found
+            pitches[foot] = np.where(orientations.valid[foot], angle, np.nan)
+    return pitches
 
 
 def find_stances(strides: Strides, t_s: Floats, pitch: dict[Segment, Floats]) -> Stances:
@@ -87,8 +87,8 @@ def _flat_part(pitch: Floats) -> Floats:
     one.
     """
     m, points = pitch.shape
-    known = np.asarray(np.isfinite(pitch).all(axis=1), np.bool_)
-    pitch = np.where(known[:, None], pitch, 0.0)
+    finite = np.asarray(np.isfinite(pitch).all(axis=1), np.bool_)
+    pitch = np.where(finite[:, None], pitch, 0.0)
     way = np.concatenate((np.zeros((m, 1)), np.cumsum(np.abs(np.diff(pitch, axis=1)), axis=1)), axis=1)
     moved = way[:, QUIET:] - way[:, :-QUIET]
     quiet = np.argmin(moved, axis=1)
@@ -98,13 +98,13 @@ def _flat_part(pitch: Floats) -> Floats:
     off = np.abs(pitch - level[:, None]) - FLAT_RAD
     index, middle = np.arange(points), quiet + QUIET // 2
     # the last point off the floor before the quiet middle, the first one after it
-    before = np.where((off >= 0.0) & (index < middle[:, None]), index, -1).max(axis=1)
-    after = np.where((off >= 0.0) & (index > middle[:, None]), index, points).min(axis=1)
-    first, last = np.maximum(before, 0), np.minimum(after, points - 1)
+    previous_off = np.where((off >= 0.0) & (index < middle[:, None]), index, -1).max(axis=1)
+    next_off = np.where((off >= 0.0) & (index > middle[:, None]), index, points).min(axis=1)
+    first, last = np.maximum(previous_off, 0), np.minimum(next_off, points - 1)
     # where between two points the limit is passed
-    enter = np.where(before < 0, 0.0, first + _share(off[each, first], off[each, first + 1]))
-    leave = np.where(after == points, points - 1.0, last - _share(off[each, last], off[each, last - 1]))
-    flat = known & (moved[each, quiet] < FLAT_RAD) & (np.abs(level) < LEVEL_RAD) & (off[each, middle] < 0.0)
+    enter = np.where(previous_off < 0, 0.0, first + _share(off[each, first], off[each, first + 1]))
+    leave = np.where(next_off == points, points - 1.0, last - _share(off[each, last], off[each, last - 1]))
+    flat = finite & (moved[each, quiet] < FLAT_RAD) & (np.abs(level) < LEVEL_RAD) & (off[each, middle] < 0.0)
     return np.where(flat[:, None], np.stack((enter, leave), axis=1) / (points - 1), np.nan)
 
 

@@ -68,8 +68,8 @@ class Symmetry:
         """Whether the sides differ significantly: the interval excludes 0, and the difference exceeds the
         resolution.
         """
-        told = self.low is not None and self.high is not None and self.low * self.high > 0.0
-        return told and abs(self.difference) >= KNOWN_TO.get(self.unit, 0.0)
+        is_significant = self.low is not None and self.high is not None and self.low * self.high > 0.0
+        return is_significant and abs(self.difference) >= KNOWN_TO.get(self.unit, 0.0)
 
 
 def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None) -> tuple[Symmetry, ...]:
@@ -80,10 +80,12 @@ def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None)
     affected : the affected side, None = none or both: left against right.
     """
     first: Side = affected or "left"
-    found = {(p.name, p.side): p for p in parameters}
+    parameters_by_key = {(p.name, p.side): p for p in parameters}
     reference = "left/right" if affected is None else "affected/unaffected"
     pairs = (
-        (found.get((p.name, first)), found.get((p.name, OTHER[first]))) for p in parameters if p.side == first
+        (parameters_by_key.get((p.name, first)), parameters_by_key.get((p.name, OTHER[first])))
+        for p in parameters
+        if p.side == first
     )
     return tuple(
         _symmetry(
@@ -99,19 +101,19 @@ def compare_sides(parameters: Sequence[Parameter], affected: Side | None = None)
     )
 
 
-def ratio(first: float, other: float) -> float:
-    """first / other."""
-    return first / other
+def ratio(first: float, second: float) -> float:
+    """first / second."""
+    return first / second
 
 
-def index_pct(first: float, other: float) -> float:
-    """Symmetry index of Robinson 1987: 100 (first − other) / (½ (first + other)), signed."""
-    return 100.0 * (first - other) / (0.5 * (first + other))
+def index_pct(first: float, second: float) -> float:
+    """Symmetry index of Robinson 1987: 100 (first − second) / (½ (first + second)), signed."""
+    return 100.0 * (first - second) / (0.5 * (first + second))
 
 
-def angle_pct(first: float, other: float) -> float:
-    """Symmetry angle of Zifchock 2008 of two positive values: (45° − atan(first / other)) / 90° · 100."""
-    return (45.0 - degrees(atan(first / other))) / 90.0 * 100.0
+def angle_pct(first: float, second: float) -> float:
+    """Symmetry angle of Zifchock 2008 of two positive values: (45° − atan(first / second)) / 90° · 100."""
+    return (45.0 - degrees(atan(first / second))) / 90.0 * 100.0
 
 
 def phase_coordination(strides: Strides) -> Parameter:
@@ -126,17 +128,21 @@ def phase_coordination(strides: Strides) -> Parameter:
     "few_strides" (below 10, as for every measure of variability).
     """
     name = "pci_pct"
-    of = strides.columns
-    swing = of.end_s - of.tc_s
-    swings = {side: swing[own][~np.isnan(swing[own])] for side, own in of.used.items()}
-    if not of.counted.any():
+    stride_columns = strides.columns
+    swing = stride_columns.end_s - stride_columns.tc_s
+    swings = {side: swing[own][~np.isnan(swing[own])] for side, own in stride_columns.used.items()}
+    if not stride_columns.counted.any():
         return Parameter(name, None, 0, None, None, "%", "no_strides")
     if not all(map(len, swings.values())):
-        one_foot = not all(map(len, of.used.values()))
+        one_foot = not all(map(len, stride_columns.used.values()))
         reason = "opposite_foot_missing" if one_foot else "no_terminal_contact"
         return Parameter(name, None, 0, None, None, "%", reason)
-    own = of.used[max(SIDES, key=lambda side: float(swings[side].mean()))]
-    phi = 360.0 * (of.opposite_ic_s[own] - of.start_s[own]) / of.duration_s[own]
+    own = stride_columns.used[max(SIDES, key=lambda side: float(swings[side].mean()))]
+    phi = (
+        360.0
+        * (stride_columns.opposite_ic_s[own] - stride_columns.start_s[own])
+        / stride_columns.duration_s[own]
+    )
     phi = phi[~np.isnan(phi)]
     cv = cv_pct(phi, "") if len(phi) >= CV_STRIDES else None
     if cv is None:
@@ -146,12 +152,12 @@ def phase_coordination(strides: Strides) -> Parameter:
     return Parameter(name, None, len(phi), value, None, "%", note=note)
 
 
-def _symmetry(of: Parameter, first: Spread, other: Spread, side: Side, reference: str) -> Symmetry:
-    low, high = difference_interval(first, other) or (None, None)
-    a, b = first.mean, other.mean
-    plain = Symmetry(of.name, of.unit, side, reference, a - b, low=low, high=high)
-    if of.unit == "deg":
+def _symmetry(parameter: Parameter, first: Spread, second: Spread, side: Side, reference: str) -> Symmetry:
+    low, high = difference_interval(first, second) or (None, None)
+    a, b = first.mean, second.mean
+    plain = Symmetry(parameter.name, parameter.unit, side, reference, a - b, low=low, high=high)
+    if parameter.unit == "deg":
         return replace(plain, reason="angle")
-    if min(a, b) <= LEAST.get(of.unit, 0.0):
+    if min(a, b) <= LEAST.get(parameter.unit, 0.0):
         return replace(plain, reason="near_zero")
     return replace(plain, ratio=ratio(a, b), index_pct=index_pct(a, b), angle_pct=angle_pct(a, b))

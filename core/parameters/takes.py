@@ -37,18 +37,18 @@ def join_takes(takes: Sequence[Parameter]) -> Parameter:
     first = takes[0]
     if any((p.name, p.side, p.unit) != (first.name, first.side, first.unit) for p in takes):
         raise ParameterError("unlike_takes", "Takes are joined for one parameter of one side.")
-    there = [p for p in takes if p.mean is not None]
-    if len(there) < 2:
-        return there[0] if there else first
-    k = len(there)
-    mean = sum(p.mean for p in there if p.mean is not None) / k
-    halves = [0.5 * (p.ci_high - p.ci_low) for p in there if p.ci_low is not None and p.ci_high is not None]
+    valid = [p for p in takes if p.mean is not None]
+    if len(valid) < 2:
+        return valid[0] if valid else first
+    k = len(valid)
+    mean = sum(p.mean for p in valid if p.mean is not None) / k
+    halves = [0.5 * (p.ci_high - p.ci_low) for p in valid if p.ci_low is not None and p.ci_high is not None]
     half = _mean_of_independent(halves) if len(halves) == k else None
-    own = [p.u_own for p in there if p.u_own is not None]
-    common = [p.u_common for p in there if p.u_common is not None]
+    own = [p.u_own for p in valid if p.u_own is not None]
+    common = [p.u_common for p in valid if p.u_common is not None]
     return replace(
         first,
-        n=sum(p.n for p in there),
+        n=sum(p.n for p in valid),
         mean=mean,
         sd=None,
         reason=None,
@@ -60,7 +60,7 @@ def join_takes(takes: Sequence[Parameter]) -> Parameter:
         u_own=_mean_of_independent(own) if len(own) == k else None,
         # the same error in all, in each as large as its events and sensors leave it
         u_common=sum(common) / k if len(common) == k else None,
-        estimated=any(p.estimated for p in there),
+        estimated=any(p.estimated for p in valid),
     )
 
 

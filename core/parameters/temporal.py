@@ -33,9 +33,9 @@ def per_stride(strides: Strides) -> dict[str, Column]:
 
 def temporal_values(strides: Strides) -> dict[str, Floats]:
     """Temporal parameters (strides,) by name, s or % of the stride; NaN if undefined."""
-    of = strides.columns
+    columns = strides.columns
     start, tc, end, opposite_tc, opposite_ic = (
-        of.start_s, of.tc_s, of.end_s, of.opposite_tc_s, of.opposite_ic_s
+        columns.start_s, columns.tc_s, columns.end_s, columns.opposite_tc_s, columns.opposite_ic_s
     )  # fmt: skip
     initial = opposite_tc - start
     # a foot that leaves before the other lands runs: there is no double support to measure
@@ -56,10 +56,10 @@ def temporal_values(strides: Strides) -> dict[str, Floats]:
     return values
 
 
-def possible_values(found: Mapping[str, Floats]) -> dict[str, Floats]:
+def possible_values(times_by_name: Mapping[str, Floats]) -> dict[str, Floats]:
     """The same times (strides,), with NaN also for physiologically impossible values."""
     possible = {}
-    for name, x in found.items():
+    for name, x in times_by_name.items():
         low, high = CATALOGUE[name].plausible
         possible[name] = x if (low, high) == (-inf, inf) else np.where((x < low) | (x > high), np.nan, x)
     return possible
@@ -74,26 +74,28 @@ def summarise_times(strides: Strides) -> tuple[Parameter, ...]:
     "opposite_foot_missing", "no_double_support" (a flight phase).
     """
     parameters: list[Parameter] = []
-    found = temporal_values(strides)
-    possible = possible_values(found)
+    times_by_name = temporal_values(strides)
+    possible = possible_values(times_by_name)
     steps = []
     for side in SIDES:
         used = strides.columns.used[side]
         for name, column in possible.items():
             values = column[used]
             values = values[~np.isnan(values)]
-            why = None
+            missing_reason = None
             if not len(values):
-                there = not np.isnan(found[name][used]).all()
-                why = IMPOSSIBLE if there else explain_missing(name, strides.select_used(side))
-            parameters.append(summarise_values(name, side, values, unit_of(name), why))
+                has_values = not np.isnan(times_by_name[name][used]).all()
+                missing_reason = (
+                    IMPOSSIBLE if has_values else explain_missing(name, strides.select_used(side))
+                )
+            parameters.append(summarise_values(name, side, values, unit_of(name), missing_reason))
             if name == "step_time_s":
                 steps.append(values)
-    both = np.concatenate(steps)
+    all_steps = np.concatenate(steps)
     reason = "opposite_foot_missing" if strides.columns.counted.any() else "no_strides"
-    if not len(both) and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
+    if not len(all_steps) and any(p.reason == IMPOSSIBLE and p.name == "step_time_s" for p in parameters):
         reason = IMPOSSIBLE
-    parameters.append(cadence(summarise_values("step_time_s", None, both, "s", reason)))
+    parameters.append(cadence(summarise_values("step_time_s", None, all_steps, "s", reason)))
     return tuple(parameters)
 
 
@@ -119,11 +121,11 @@ def cadence(step: Parameter) -> Parameter:
         return summarise_values(named.name, step.side, [], named.unit, IMPOSSIBLE)
     low, high = step.ci_low, step.ci_high
     # two wildly different steps say nothing about how few a minute may have
-    known = low is not None and high is not None and low > 0.0
+    has_interval = low is not None and high is not None and low > 0.0
     return replace(
         named,
         mean=60.0 / step.mean,
         sd=None if step.sd is None else 60.0 * step.sd / step.mean**2,
-        ci_low=60.0 / high if known and high is not None else None,
-        ci_high=60.0 / low if known and low is not None else None,
+        ci_low=60.0 / high if has_interval and high is not None else None,
+        ci_high=60.0 / low if has_interval and low is not None else None,
     )

@@ -90,11 +90,11 @@ def harmonic_ratios(pieces: Floats) -> dict[str, Floats]:
     """
     amplitude = np.abs(np.fft.rfft(pieces, axis=-1)[..., 1 : HARMONICS + 1])
     odd, even = amplitude[..., ::2].sum(axis=-1), amplitude[..., 1::2].sum(axis=-1)
-    found = {}
+    ratios = {}
     for axis, column in AXES.items():
-        above, below = (odd[column], even[column]) if axis == "ml" else (even[column], odd[column])
-        found[axis] = above / np.where(below > 0.0, below, np.nan)
-    return found
+        numerator, denominator = (odd[column], even[column]) if axis == "ml" else (even[column], odd[column])
+        ratios[axis] = numerator / np.where(denominator > 0.0, denominator, np.nan)
+    return ratios
 
 
 def _why(acceleration: Floats, axis: str) -> str:
@@ -105,8 +105,8 @@ def _why(acceleration: Floats, axis: str) -> str:
 def _harmonic_ratios(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:
     pieces = np.stack(resample(acceleration.T, t_s, np.array(own), POINTS + 1))[..., :-1]
     for axis, values in harmonic_ratios(pieces).items():
-        known = values[np.isfinite(values)]
-        yield summarise_values(f"harmonic_ratio_{axis}", None, known, "", _why(acceleration, axis))
+        finite_values = values[np.isfinite(values)]
+        yield summarise_values(f"harmonic_ratio_{axis}", None, finite_values, "", _why(acceleration, axis))
 
 
 def _regularity(own: Sequence[Window], t_s: Floats, acceleration: Floats) -> Iterator[Parameter]:

@@ -143,10 +143,10 @@ def _stated(
     variable = _variable(p.name)
     if variable is not None and p.estimated:
         joint = variable.partition("_")[0]
-        known = FEET_ALONE_DEG if "pelvis_tilt" in estimated else ESTIMATED_DEG
-        if known is FEET_ALONE_DEG and entry.curve is not None and entry.curve.statistic == "at":
-            known = {**known, **FEET_ALONE_AT_CONTACT_DEG}
-        errors = replace(errors, own=max(errors.own, known.get(joint, errors.own)))
+        joint_errors = FEET_ALONE_DEG if "pelvis_tilt" in estimated else ESTIMATED_DEG
+        if joint_errors is FEET_ALONE_DEG and entry.curve is not None and entry.curve.statistic == "at":
+            joint_errors = {**joint_errors, **FEET_ALONE_AT_CONTACT_DEG}
+        errors = replace(errors, own=max(errors.own, joint_errors.get(joint, errors.own)))
     common, own, random = errors.common, errors.own, errors.random
     if errors.contacts is not None:
         in_s = _of_contacts(errors.contacts, contacts, p.side, feet_lag_s)
@@ -194,12 +194,14 @@ def _contact_errors(events: GaitEvents | None) -> dict[Side, ContactErrors]:
 
     A manual event counts as `TYPICAL_S`: people who mark the same signal differ by as much.
     """
-    known: dict[tuple[Side, EventKind], list[float]] = {}
+    stated_errors: dict[tuple[Side, EventKind], list[float]] = {}
     for e in () if events is None else events.events:
         stated = TYPICAL_S if e.source == MANUAL else e.uncertainty_s
         if stated is not None:
-            known.setdefault((e.side, e.kind), []).append(stated)
-    return {side: _foot_errors(known.get((side, "ic")), known.get((side, "tc"))) for side in SIDES}
+            stated_errors.setdefault((e.side, e.kind), []).append(stated)
+    return {
+        side: _foot_errors(stated_errors.get((side, "ic")), stated_errors.get((side, "tc"))) for side in SIDES
+    }
 
 
 def _foot_errors(contacts: Sequence[float] | None, leavings: Sequence[float] | None) -> ContactErrors:
@@ -207,6 +209,8 @@ def _foot_errors(contacts: Sequence[float] | None, leavings: Sequence[float] | N
     if not contacts or not leavings:
         return PITCH_RULE
     ic, tc = (float(np.sqrt(np.mean(np.square(x)))) / TYPICAL_S for x in (contacts, leavings))
-    both = hypot(ic, tc) / sqrt(2.0)
-    foot = REFINED.foot if both * TYPICAL_S <= WITHOUT_FOOT_S else REFINED.contact
-    return ContactErrors(REFINED.contact * ic, REFINED.foot_off * tc, foot * both, REFINED.random * both)
+    combined = hypot(ic, tc) / sqrt(2.0)
+    foot = REFINED.foot if combined * TYPICAL_S <= WITHOUT_FOOT_S else REFINED.contact
+    return ContactErrors(
+        REFINED.contact * ic, REFINED.foot_off * tc, foot * combined, REFINED.random * combined
+    )

@@ -116,12 +116,12 @@ def difference_interval(a: Spread, b: Spread) -> tuple[float, float] | None:
     """
     if a.sd is None or b.sd is None:
         return None
-    own, other = a.sd**2 / a.n, b.sd**2 / b.n
-    between = own + other
+    variance_a, variance_b = a.sd**2 / a.n, b.sd**2 / b.n
+    variance = variance_a + variance_b
     half = 0.0
-    if between > 0.0:
-        freedom = between**2 / (own**2 / (a.n - 1) + other**2 / (b.n - 1))
-        half = t_quantile(max(int(freedom), 1)) * sqrt(between)
+    if variance > 0.0:
+        freedom = variance**2 / (variance_a**2 / (a.n - 1) + variance_b**2 / (b.n - 1))
+        half = t_quantile(max(int(freedom), 1)) * sqrt(variance)
     half = hypot(half, NORMAL_95 * hypot(a.own, b.own))
     return a.mean - b.mean - half, a.mean - b.mean + half
 

@@ -57,7 +57,7 @@ def step_strides(steps: Steps) -> tuple[Window, ...]:
         steady = contacts[EDGE_STEPS : len(contacts) - EDGE_STEPS]
         breaks = [first for first, _ in bout.breaks]
         pairs = zip(steady[:-2:2], steady[2::2], strict=True)
-        strides += [(a, b) for a, b in pairs if not any(a <= at < b for at in breaks)]
+        strides += [(a, b) for a, b in pairs if not any(a <= break_s < b for break_s in breaks)]
     return tuple(strides)
 
 
@@ -67,9 +67,11 @@ def step_parameters(steps: Steps) -> tuple[Parameter, ...]:
     Steps belong to the whole recording: sides are determined for whole walks or not at all, and the two ends
     of a step have errors of different feet.
     """
-    found = steps.step_times_s
-    times = [t for t in found if not is_impossible("step_time_s", t)]
-    reason = None if times else next((n.code for n in steps.notices), IMPOSSIBLE if found else "no_strides")
+    step_times = steps.step_times_s
+    times = [t for t in step_times if not is_impossible("step_time_s", t)]
+    reason = (
+        None if times else next((n.code for n in steps.notices), IMPOSSIBLE if step_times else "no_strides")
+    )
     step = summarise_values("step_time_s", None, times, "s", reason)
     n = len(steps.steps)
     return (cadence(step), step, Parameter("step_count", None, n, float(n), None, ""))

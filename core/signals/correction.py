@@ -102,12 +102,12 @@ class SensorCorrection:
 
     def to_json(self) -> dict[str, object]:
         """In the form of a manifest; unchanged items are omitted."""
-        said: dict[str, object] = {
+        items: dict[str, object] = {
             name: list(getattr(self, name))
             for name in ("acc_axes", "gyr_axes")
             if getattr(self, name) != AS_READ
         }
-        return said | {
+        return items | {
             name: getattr(self, name) for name in ("acc_times", "gyr_times") if getattr(self, name) != 1.0
         }
 
@@ -117,7 +117,7 @@ class SensorCorrection:
         >>> SensorCorrection(gyr_times=0.017453292519943295).say()
         'its rates are taken as degrees per second'
         """
-        said = []
+        phrases = []
         for whose, times, axes in (
             ("acceleration", self.acc_times, self.acc_axes),
             ("rates", self.gyr_times, self.gyr_axes),
@@ -125,15 +125,15 @@ class SensorCorrection:
             be = "is" if whose == "acceleration" else "are"
             unit = next((u for u, x in UNIT_FACTORS[whose].items() if isclose(x, times, rel_tol=1e-3)), None)
             if unit is not None:
-                said.append(f"its {whose} {be} taken as {unit}")
+                phrases.append(f"its {whose} {be} taken as {unit}")
             elif times != 1.0:
-                said.append(f"its {whose} {be} multiplied by {times:.4g}")
+                phrases.append(f"its {whose} {be} multiplied by {times:.4g}")
             if axes == AGAINST:
-                said.append(f"its {whose} {be} taken with all signs turned round")
+                phrases.append(f"its {whose} {be} taken with all signs turned round")
             elif axes != AS_READ:
                 named = ", ".join(axes).replace("-", "\N{MINUS SIGN}")
-                said.append(f"the axes of its {whose} are taken as {named} for x, y, z")
-        return " and ".join(said) or "nothing"
+                phrases.append(f"the axes of its {whose} are taken as {named} for x, y, z")
+        return " and ".join(phrases) or "nothing"
 
 
 def to_axes_matrix(axes: Sequence[str]) -> Floats:

@@ -48,9 +48,9 @@ def low_pass(x: Floats, cutoff_hz: float, rate_hz: float, pad: int | None = None
     n = x.shape[-1]
     reach = min(n - 1, round(PAD_S * rate_hz) if pad is None else pad)
     rows = np.ascontiguousarray(x, np.float64).reshape(-1, n)
-    found = np.empty(rows.shape)
-    filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), found)
-    return found.reshape(x.shape)
+    output = np.empty(rows.shape)
+    filter_both_ways(rows, *_design(cutoff_hz, rate_hz), reach, np.empty(n + 2 * reach), output)
+    return output.reshape(x.shape)
 
 
 WIDTHS: Final = 4.0
@@ -81,9 +81,9 @@ def smooth_gaussian(x: Floats, sd: float) -> Floats:
     size = 1 << (max(LEAST_PIECE, REACHES * reach) - 1).bit_length()
     spectrum = np.fft.rfft(bell / bell.sum(), size)
     held = np.pad(x, reach, mode="edge")
-    found, step = np.empty(len(x)), size - 2 * reach
+    output, step = np.empty(len(x)), size - 2 * reach
     for first in range(0, len(x), step):
         # the first 2 reach samples of a piece have the end of it mixed in
         piece = np.fft.irfft(np.fft.rfft(held[first : first + size], size) * spectrum, size)[2 * reach :]
-        found[first : first + step] = piece[: len(x) - first]
-    return found
+        output[first : first + step] = piece[: len(x) - first]
+    return output

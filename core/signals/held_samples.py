@@ -43,12 +43,12 @@ def cut_blocks(samples: int) -> Iterator[slice]:
         yield slice(first, min(first + AT_A_TIME, samples))
 
 
-def compare_neighbours(x: Floats, of: Callable[[Floats, Floats], Floats]) -> Floats:
-    """Apply `of` to every sample of x (n, k) and its successor, (n − 1,), block by block."""
-    found = np.empty(max(0, len(x) - 1))
-    for part in cut_blocks(len(found)):
-        found[part] = of(x[part], x[part.start + 1 : part.stop + 1])
-    return found
+def compare_neighbours(x: Floats, metric: Callable[[Floats, Floats], Floats]) -> Floats:
+    """Apply `metric` to every sample of x (n, k) and its successor, (n − 1,), block by block."""
+    values = np.empty(max(0, len(x) - 1))
+    for part in cut_blocks(len(values)):
+        values[part] = metric(x[part], x[part.start + 1 : part.stop + 1])
+    return values
 
 
 def is_complete(x: Floats) -> Bools:
@@ -116,8 +116,8 @@ class HoldsSamples:
 
     def change(self, **fields: Any) -> Self:
         """A copy with other fields; unchanged samples are shared."""
-        kept = {name: self.held(name) for name in self.sampled}
-        return replace(self, **{**kept, **fields})  # type: ignore[type-var] # every class here is a dataclass
+        samples = {name: self.held(name) for name in self.sampled}
+        return replace(self, **{**samples, **fields})  # type: ignore[type-var] # every class here is a dataclass
 
 
 @dataclass(frozen=True, eq=False)

@@ -83,7 +83,7 @@ def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-unty
     # running sums of the samples before the window, and of those up to its end
     a0 = a1 = a2 = b0 = b1 = b2 = 0.0
     s0 = s1 = s2 = t0 = t1 = t2 = 0.0
-    lost, least, found = 0, 0.0, False
+    lost, least, has_window = 0, 0.0, False
     for k in range(len(valid)):
         x, y, z = gyr[k, 0], gyr[k, 1], gyr[k, 2]
         b0, b1, b2 = b0 + x, b1 + y, b2 + z
@@ -96,9 +96,9 @@ def find_steadiest_rate(gyr, valid, width, whole, mean):  # type: ignore[no-unty
         spread = ((t0 - s0) / width - m0 * m0) + ((t1 - s1) / width - m1 * m1)
         spread += (t2 - s2) / width - m2 * m2
         whole[i] = lost == 0
-        if i == 0 or (whole[i] and (not found or spread < least)):
+        if i == 0 or (whole[i] and (not has_window or spread < least)):
             mean[0], mean[1], mean[2] = m0, m1, m2
-            found, least = whole[i], spread
+            has_window, least = whole[i], spread
         x, y, z = gyr[i, 0], gyr[i, 1], gyr[i, 2]
         a0, a1, a2 = a0 + x, a1 + y, a2 + z
         s0, s1, s2 = s0 + x * x, s1 + y * y, s2 + z * z
@@ -119,16 +119,16 @@ def measure_windows(x, width, mean, sd):  # type: ignore[no-untyped-def]
     borders.
     """
     n, half = len(x), width // 2
-    before = until = square_before = square_until = 0.0
+    sum_before = sum_until = square_before = square_until = 0.0
     for k in range(n):
-        until, square_until = until + x[k], square_until + x[k] * x[k]
+        sum_until, square_until = sum_until + x[k], square_until + x[k] * x[k]
         i = k - width + 1
         if i < 0:
             continue
-        m = (until - before) / width
+        m = (sum_until - sum_before) / width
         v = (square_until - square_before) / width - m * m
         mean[i + half], sd[i + half] = m, sqrt(max(v, 0.0))
-        before, square_before = before + x[i], square_before + x[i] * x[i]
+        sum_before, square_before = sum_before + x[i], square_before + x[i] * x[i]
     for k in range(half):
         mean[k], sd[k] = mean[half], sd[half]
     last = n - width + half

@@ -18,7 +18,7 @@ from sagittal.core.frames import Floats
 
 
 def make_pages(*shape: int) -> Floats:
-    """Zeros of a non-empty shape, in pages returned to the operating system as soon as they are unreferenced.
+    """Zeros of a non-empty shape, in pages returned to the operating system once unreferenced.
 
     Pages never written to take no memory.
     """

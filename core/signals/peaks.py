@@ -63,8 +63,8 @@ def _measure_prominence(x: Floats, tops: NDArray[np.int64]) -> Floats:
     valleys = np.minimum.reduceat(x, np.concatenate(([0], tops))).astype(np.float64)
     find_lows(float(x[0]), level, valleys[:-1].copy(), higher, left)
     find_lows(float(x[-1]), level[::-1].copy(), valleys[:0:-1].copy(), higher, right)
-    found: Floats = level - np.maximum(left, right[::-1])
-    return found
+    prominence: Floats = level - np.maximum(left, right[::-1])
+    return prominence
 
 
 def compile_peak_kernel() -> None:

@@ -24,7 +24,7 @@ from sagittal.core.subject.shoe import Shoe
 from sagittal.core.subject.standing_angles import check_standing
 
 
-def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], where: str) -> None:
+def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], label: str) -> None:
     """Check shape and type of an array once and make it read-only."""
     if a is None:
         return
@@ -35,7 +35,7 @@ def _frozen(a: Floats | Bools | None, name: str, shape: tuple[int | None, ...], 
             "bad_shape",
             Message(
                 "{where}: {name} has shape {shape}, expected {shape2}.",
-                where=where,
+                where=label,
                 name=name,
                 shape=a.shape,
                 shape2=shape,
@@ -281,7 +281,7 @@ class Recording:
                     PROTOCOLS=", ".join(PROTOCOLS),
                 ),
             )
-        worn: dict[str, str] = {}
+        devices: dict[str, str] = {}
         for device, segment in self.segments.items():
             if segment is None:
                 continue
@@ -296,18 +296,18 @@ class Recording:
                     ),
                     sensor=device,
                 )
-            if segment in worn:
+            if segment in devices:
                 raise ParameterError(
                     "duplicate_segment",
                     Message(
                         "Sensors {segment} and {device} are both mapped to {segment2}; choose one.",
-                        segment=worn[segment],
+                        segment=devices[segment],
                         device=device,
                         segment2=segment,
                     ),
                     sensor=device,
                 )
-            worn[segment] = device
+            devices[segment] = device
         for name in ("streams", "segments", "mounting", "sha256", "long"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 

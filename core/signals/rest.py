@@ -190,28 +190,28 @@ def find_windows(quiet: Bools, rate_hz: float, params: QuietParams | None = None
     params = params or QuietParams()
     n = len(quiet)
     reach = round(0.25 * params.window_s * rate_hz)
-    found = []
+    windows = []
     for start, end in find_runs(quiet):
         first, last = max(0, start - reach), min(n, end + reach)
         if last - first >= params.shortest_s * rate_hz - 1:
-            found.append((first / rate_hz, last / rate_hz))
-    return tuple(found)
+            windows.append((first / rate_hz, last / rate_hz))
+    return tuple(windows)
 
 
-def count_runs(mask: Bools, before: NDArray[np.int64]) -> NDArray[np.int64]:
+def count_runs(mask: Bools, previous_counts: NDArray[np.int64]) -> NDArray[np.int64]:
     """Consecutive true samples (T, n), including the current one, for each sample of a mask (T, n).
 
     Parameters
     ----------
-    before : (n,) count before the block, advanced in place.
+    previous_counts : (n,) count before the block, advanced in place.
     """
     if not len(mask):
         return np.zeros(mask.shape, np.int64)
     count = np.arange(1, len(mask) + 1)[:, None]
     since = np.maximum.accumulate(np.where(mask, 0, count), axis=0)
-    found = count - since + np.where(since == 0, before, 0)
-    before[:] = found[-1]
-    return np.asarray(found, np.int64)
+    counts = count - since + np.where(since == 0, previous_counts, 0)
+    previous_counts[:] = counts[-1]
+    return np.asarray(counts, np.int64)
 
 
 def find_runs(mask: Bools) -> list[tuple[int, int]]:

@@ -46,7 +46,7 @@ class Breaks:
 
     Parameters
     ----------
-    stamps : (n,) corrected. repairs : what was removed. restart : row at which the clock starts again.
+    stamps : (n,) corrected. repairs : jumps removed. restart : row at which the clock starts again.
     """
 
     stamps: Floats
@@ -76,25 +76,25 @@ def mend_breaks(x: Floats, step: float, usual: int, *, seconds: bool, wrap: floa
     for (a, b), (c, d) in pairwise(pieces):
         jump = float(np.median(level[c : min(d, c + _EDGE)]) - np.median(level[max(a, b - _EDGE) : b]))
         # rows between two believed stretches belong to the later one where they are at its level
-        at = c
-        while at > b and abs(level[at - 1] - level[c]) <= tolerance:
-            at -= 1
+        row = c
+        while row > b and abs(level[row - 1] - level[c]) <= tolerance:
+            row -= 1
         if abs(jump) < tolerance:
             continue
         if not seconds:
             if jump < 0 and wrap is not None:
-                y[at:] += wrap
+                y[row:] += wrap
             elif jump < 0:
-                return Breaks(y, tuple(repairs), at)
+                return Breaks(y, tuple(repairs), row)
             continue
-        if (known := _explain(jump)) is not None:
-            y[at:] -= known[0]
-            repairs.append(describe_leap(at, known[0], known[1]))
+        if (explanation := _explain(jump)) is not None:
+            y[row:] -= explanation[0]
+            repairs.append(describe_leap(row, explanation[0], explanation[1]))
         elif jump < 0:
             if x[c] < x[pieces[0][0]] + _AT_START:
-                return Breaks(y, tuple(repairs), at)
-            y[at:] -= jump
-            repairs.append(describe_set_back(at, -jump))
+                return Breaks(y, tuple(repairs), row)
+            y[row:] -= jump
+            repairs.append(describe_set_back(row, -jump))
     return Breaks(y, tuple(repairs), None)
 
 
@@ -102,15 +102,15 @@ def _remove_known(x: Floats, step: float) -> tuple[Floats, list[Repair]]:
     """Take back jumps from one row to the next that explain themselves and last."""
     y, repairs = x.copy(), []
     for i in np.flatnonzero(np.abs(np.diff(x) - step) > _SMALLEST_S) + 1:
-        known = _explain(float(y[i] - y[i - 1] - step))
-        if known is None:
+        explanation = _explain(float(y[i] - y[i - 1] - step))
+        if explanation is None:
             continue
-        before, after = y[max(0, i - _EDGE) : i], y[i : i + _EDGE]
-        if len(after) < _FEW or len(before) < _FEW:
+        previous_values, next_values = y[max(0, i - _EDGE) : i], y[i : i + _EDGE]
+        if len(next_values) < _FEW or len(previous_values) < _FEW:
             continue
-        if abs(float(np.median(after) - np.median(before)) - known[0]) < _LASTING_S:
-            y[i:] -= known[0]
-            repairs.append(describe_leap(int(i), known[0], known[1]))
+        if abs(float(np.median(next_values) - np.median(previous_values)) - explanation[0]) < _LASTING_S:
+            y[i:] -= explanation[0]
+            repairs.append(describe_leap(int(i), explanation[0], explanation[1]))
     return y, repairs
 
 
@@ -130,8 +130,8 @@ def _find_strays(level: Floats, pieces: Sequence[tuple[int, int]], far: float) -
 
 
 def _explain(jump: float) -> tuple[float, str] | None:
-    for unit, most, why in _KNOWN:
+    for unit, most, reason in _KNOWN:
         times = round(jump / unit)
         if times and abs(times) <= most and abs(jump - times * unit) < _NEAR:
-            return times * unit, _MIDNIGHT if times * unit in (-86_400.0, -43_200.0) else why
+            return times * unit, _MIDNIGHT if times * unit in (-86_400.0, -43_200.0) else reason
     return None

@@ -41,8 +41,8 @@ def sort_runs(stamps: Floats, widths: Ints, step: float, same: Floats) -> Sorted
     on = np.zeros(m, np.bool_)
     on[chain] = True
     off = np.flatnonzero(~on)
-    at = np.searchsorted(chain, off)
-    groups = np.split(off, np.flatnonzero(np.diff(at)) + 1) if len(off) else []
+    positions = np.searchsorted(chain, off)
+    groups = np.split(off, np.flatnonzero(np.diff(positions)) + 1) if len(off) else []
     sorting = _Sorting(stamps, widths, step, chain, same)
     # those that have no room where they are go first: others are not to be timed by a hole that is theirs
     roomy = [sorting.has_room(group) for group in groups]
@@ -67,9 +67,9 @@ def sort_runs(stamps: Floats, widths: Ints, step: float, same: Floats) -> Sorted
 
 
 class _Sorting:
-    """Runs beside the chain of those that rise, and the holes of the chain they may belong into.
+    """Runs outside the chain of increasing stamps, and the gaps of the chain that can receive them.
 
-    Hole k is before the k-th run of the chain.
+    Gap k precedes the k-th run of the chain.
     """
 
     def __init__(self, stamps: Floats, widths: Ints, step: float, chain: Ints, same: Floats) -> None:
@@ -91,34 +91,34 @@ class _Sorting:
 
     def has_room(self, group: Ints) -> bool:
         """Whether as many rows are missing where the group is in the file."""
-        at = int(np.searchsorted(self._chain, group[0]))
-        return bool(self._room(at) >= self._widths[group].sum() - 0.4)
+        position = int(np.searchsorted(self._chain, group[0]))
+        return bool(self._room(position) >= self._widths[group].sum() - 0.4)
 
     def distrust(self, group: Ints) -> None:
         """Keep the place of a group and ignore its stamps, but for duplicates."""
-        at = int(np.searchsorted(self._chain, group[0]))
+        position = int(np.searchsorted(self._chain, group[0]))
         for i in group.tolist():
             if self._twin(i)[1]:
                 self.repeated.append(i)
             else:
                 self.wrong.append(i)
-                self._taken[at] = self._taken.get(at, 0.0) + self._widths[i]
+                self._taken[position] = self._taken.get(position, 0.0) + self._widths[i]
 
     def move(self, group: Ints) -> None:
         """Put every run of a group where its stamp belongs, if there is a hole."""
-        at = int(np.searchsorted(self._chain, group[0]))
+        position = int(np.searchsorted(self._chain, group[0]))
         for i in group.tolist():
-            there, equal = self._twin(i)
+            has_twin, equal = self._twin(i)
             k = int(np.searchsorted(self._along, self._stamps[i], side="left"))
-            if there and equal:
+            if has_twin and equal:
                 self.repeated.append(i)
-            elif not there and 0 < k < len(self._chain) and self._room(k) >= 0.6:
+            elif not has_twin and 0 < k < len(self._chain) and self._room(k) >= 0.6:
                 share = _share(self._along[k - 1], self._along[k], self._stamps[i])
                 self.moved[i] = float(self._chain[k - 1]) + 0.25 + 0.5 * share
                 self._taken[k] = self._taken.get(k, 0.0) + self._widths[i]
-            elif self._room(at) >= 0.6:
+            elif self._room(position) >= 0.6:
                 self.wrong.append(i)
-                self._taken[at] = self._taken.get(at, 0.0) + self._widths[i]
+                self._taken[position] = self._taken.get(position, 0.0) + self._widths[i]
             else:
                 self.unplaced.append(i)
 

@@ -1,7 +1,7 @@
-"""Stamps or counts of a column as written → true times of its rows (docs/science/timeline.md, "Clocks").
+"""Stamps or counts of a column → true times of its rows (docs/science/timeline.md, "Clocks").
 
-Order of work: rows without a stamp; wraps; rows stored twice; lasting breaks; rows out of order and wrong
-stamps; stamps that several rows share. A column without any of these is returned as it is, to the bit.
+Order of work: rows without a stamp; wraps; duplicate rows; lasting breaks; rows out of order and wrong
+stamps; stamps shared by several rows. A column without any of these is returned unchanged, bit for bit.
 """
 
 from __future__ import annotations
@@ -37,10 +37,10 @@ class RepairedClock:
 
     Parameters
     ----------
-    rows : (k,) rows of the file that are kept, in their true order; None = all of them as they are.
+    rows : (k,) retained rows of the file, in their true order; None = all rows in file order.
     ticks : (k,) strictly increasing, in the unit given.
-    step : of one row in that unit, None = the clock was not repaired or it cannot be told.
-    repairs : what was found and done. restart : row at which a second recording begins.
+    step : of one row in that unit, None = the clock was not repaired, or the step is unknown.
+    repairs : faults found and their correction. restart : row at which a second recording begins.
     constant : number of different stamps where nearly all are equal.
     """
 
@@ -63,38 +63,40 @@ def repair_clock(
         which duplicates are recognised. seconds : what `ticks` are. wrap : known range of the clock, in the
         unit of `ticks`. tick : smallest unit of the column as written, in that unit; 0 = unknown.
     """
-    known = np.isfinite(ticks)
-    if seconds and known.sum() > 1 and np.ptp(ticks[known]) < _LEAST_SPAN_S:
-        return RepairedClock(np.flatnonzero(known), ticks[known], constant=len(np.unique(ticks[known])))
-    if known.all() and wrap is None and _is_clean(ticks, seconds=seconds):
+    has_stamp = np.isfinite(ticks)
+    if seconds and has_stamp.sum() > 1 and np.ptp(ticks[has_stamp]) < _LEAST_SPAN_S:
+        return RepairedClock(
+            np.flatnonzero(has_stamp), ticks[has_stamp], constant=len(np.unique(ticks[has_stamp]))
+        )
+    if has_stamp.all() and wrap is None and _is_clean(ticks, seconds=seconds):
         return RepairedClock(None, ticks)
     table = np.concatenate(signals, axis=1)
-    kept = known | np.isfinite(table).any(axis=1)
-    rows = np.flatnonzero(kept)
-    if not known.any():
+    has_data = has_stamp | np.isfinite(table).any(axis=1)
+    rows = np.flatnonzero(has_data)
+    if not has_stamp.any():
         return RepairedClock(rows[:0], ticks[:0])
     x = _fill(ticks[rows])
     repairs: list[Repair] = []
-    if (lost := np.flatnonzero(~known[rows])).size:
+    if (lost := np.flatnonzero(~has_stamp[rows])).size:
         repairs.append(report.describe_missing(len(lost), int(rows[lost[0]])))
     if wrap is not None:
         x = unwrap(x, wrap)
-        if known.all() and _is_clean(x, seconds=seconds):
+        if has_stamp.all() and _is_clean(x, seconds=seconds):
             blind = _find_blind(x, wrap, seconds=seconds)
             return RepairedClock(None, x, repairs=blind)
     runs = find_packets(x)
     distinct = len(np.unique(x))
     if runs.step is None or (distinct < max(3.0, _FEW_STAMPS * len(x)) and len(x) > 20):
         return RepairedClock(rows, x, constant=distinct)
-    if (lead := int(np.argmax(known[rows]))) > 0:
+    if (lead := int(np.argmax(has_stamp[rows]))) > 0:
         x[:lead] = x[lead] - runs.step * np.arange(lead, 0, -1)
         runs = find_packets(x)
     step = runs.step or 1.0
-    if wrap is None and (found := find_wrap(x, step, runs.usual, tick, seconds=seconds)) is not None:
-        repairs.append(_describe_wrap(x, rows, *found))
-        x = unwrap(x, found[0])
+    if wrap is None and (wrap_match := find_wrap(x, step, runs.usual, tick, seconds=seconds)) is not None:
+        repairs.append(_describe_wrap(x, rows, *wrap_match))
+        x = unwrap(x, wrap_match[0])
         runs = find_packets(x)
-    found_rows = _Rows(x, rows, _hash_rows(table[rows]), ~known[rows])
+    found_rows = _Rows(x, rows, _hash_rows(table[rows]), ~has_stamp[rows])
     return _repair(found_rows, runs, repairs, seconds=seconds, wrap=wrap)
 
 
@@ -128,27 +130,27 @@ def _repair(
     if broken.repairs or strange.any():
         x = _join_equal(_fill(broken.stamps), 8.0 * float(np.spacing(np.abs(written).max())))
         rows = replace(rows, x=x, filled=rows.filled | strange)
-        before = len(rows.x)
+        row_count = len(rows.x)
         rows, runs = _drop_twice(rows, find_packets(x), strange, repairs)
-        if len(rows.x) < before:
+        if len(rows.x) < row_count:
             strange, written = np.zeros(len(rows.x), np.bool_), rows.x
         step = runs.step or step
     x, widths = rows.x, runs.widths(len(rows.x))
     ordered = sort_runs(runs.stamps, widths, step, np.add.reduceat(rows.same, runs.first))
-    where = _rows_of(runs.first, widths, ordered.order)
+    row_index = _rows_of(runs.first, widths, ordered.order)
     ignored = ordered.wrong
     if runs.usual > 1:  # the first rows of a run after rows without a stamp may be among these
         ignored = ignored | (rows.filled[runs.first - 1] & (runs.first > 0))[ordered.order]
     spread = spread_rows(runs.stamps[ordered.order], widths[ordered.order], ignored, step, runs.usual)
     repairs += _describe_order(ordered, runs, widths, rows.at)
-    wrong = np.repeat(ordered.wrong, widths[ordered.order]) | strange[where]
-    found = replace(
-        rows, x=np.where(strange, written, x)[where], at=rows.at[where], filled=rows.filled[where]
+    wrong = np.repeat(ordered.wrong, widths[ordered.order]) | strange[row_index]
+    sorted_rows = replace(
+        rows, x=np.where(strange, written, x)[row_index], at=rows.at[row_index], filled=rows.filled[row_index]
     )
-    repairs += _describe_spread(found, spread, wrong, runs, seconds=seconds)
+    repairs += _describe_spread(sorted_rows, spread, wrong, runs, seconds=seconds)
     keep = ~spread.extra
     blind = _find_blind(spread.ticks[keep], wrap, seconds=seconds) if wrap is not None else ()
-    return RepairedClock(found.at[keep], spread.ticks[keep], spread.step, (*repairs, *blind))
+    return RepairedClock(sorted_rows.at[keep], spread.ticks[keep], spread.step, (*repairs, *blind))
 
 
 def _drop_twice(rows: _Rows, runs: Packets, but: Bools, repairs: list[Repair]) -> tuple[_Rows, Packets]:
@@ -179,11 +181,11 @@ def _is_clean(x: Floats, *, seconds: bool) -> bool:
 
 def _fill(x: Floats) -> Floats:
     """Missing stamps repeat the one before; the first ones the first that is known."""
-    known = np.isfinite(x)
-    if known.all():
+    finite = np.isfinite(x)
+    if finite.all():
         return x
-    last = np.maximum.accumulate(np.where(known, np.arange(len(x)), -1))
-    return x[np.where(last < 0, int(np.argmax(known)), last)]
+    last = np.maximum.accumulate(np.where(finite, np.arange(len(x)), -1))
+    return x[np.where(last < 0, int(np.argmax(finite)), last)]
 
 
 def _join_equal(x: Floats, rounding: float) -> Floats:
@@ -221,9 +223,9 @@ def _rows_of(first: Ints, widths: Ints, order: Ints) -> Ints:
     return start + np.arange(int(width.sum()))
 
 
-def _describe_wrap(x: Floats, rows: Ints, wrap: float, what: str) -> Repair:
-    at = np.flatnonzero(np.diff(x) < -0.6 * wrap)
-    return report.describe_wrap(len(at), int(rows[at[0] + 1]), what)
+def _describe_wrap(x: Floats, rows: Ints, wrap: float, label: str) -> Repair:
+    drops = np.flatnonzero(np.diff(x) < -0.6 * wrap)
+    return report.describe_wrap(len(drops), int(rows[drops[0] + 1]), label)
 
 
 def _find_blind(x: Floats, wrap: float, *, seconds: bool) -> tuple[Repair, ...]:
@@ -236,20 +238,20 @@ def _find_blind(x: Floats, wrap: float, *, seconds: bool) -> tuple[Repair, ...]:
 
 def _describe_order(ordered: SortedRuns, runs: Packets, widths: Ints, rows: Ints) -> list[Repair]:
     out = []
-    for found, describe in (
+    for run_indices, describe in (
         (ordered.moved, report.describe_order),
         (ordered.repeated, report.describe_repeats),
         (ordered.unplaced, report.describe_dropped),
     ):
-        if len(found):
-            out.append(describe(int(widths[found].sum()), int(rows[runs.first[found.min()]])))
+        if len(run_indices):
+            out.append(describe(int(widths[run_indices].sum()), int(rows[runs.first[run_indices.min()]])))
     return out
 
 
 def _describe_spread(
     rows: _Rows, spread: RowTimes, wrong: Bools, runs: Packets, *, seconds: bool
 ) -> list[Repair]:
-    """What was done to rows (n,) in their true order."""
+    """Repairs of rows (n,) in their true order."""
     out = []
     wrong = wrong & ~spread.extra
     if wrong.any():

@@ -1,4 +1,4 @@
-"""What was repaired in a clock, one sentence per cause."""
+"""Descriptions of clock repairs, one sentence per cause."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from sagittal.core.plurals import plural
 
 @dataclass(frozen=True)
 class Repair:
-    """One cause that was repaired.
+    """Repair of one fault of a clock.
 
     Parameters
     ----------
-    code : stable identifier, snake_case. rows : number of rows concerned. message : what was found, where,
-        and what was done, without the name of the file.
+    code : stable identifier, snake_case. rows : number of rows affected. message : fault, location and
+        correction, without the name of the file.
     """
 
     code: str
@@ -35,23 +35,23 @@ def describe_missing(rows: int, first: int) -> Repair:
     )
 
 
-def describe_wrap(times: int, first: int, what: str) -> Repair:
+def describe_wrap(times: int, first: int, label: str) -> Repair:
     """Wraps of a clock or counter that were undone."""
     return Repair(
         "clock_wrapped",
         times,
-        f"The clock starts again at the end of its range ({what}) {times} {plural(times, 'time', 'times')}, "
+        f"The clock starts again at the end of its range ({label}) {times} {plural(times, 'time', 'times')}, "
         f"first at row {first + 1}; the wraps were undone.",
     )
 
 
-def describe_leap(row: int, seconds: float, why: str) -> Repair:
+def describe_leap(row: int, seconds: float, reason: str) -> Repair:
     """A leap of all later stamps by an amount that explains itself."""
     return Repair(
         "clock_leap",
         1,
         f"From row {row + 1} on, all times are {abs(seconds):g} s {'later' if seconds > 0 else 'earlier'} "
-        f"({why}); this jump was removed.",
+        f"({reason}); this jump was removed.",
     )
 
 
@@ -118,12 +118,12 @@ def describe_dropped(rows: int, first: int) -> Repair:
 
 def describe_shared(most: int, rate_hz: float | None) -> Repair:
     """Stamps that several rows share."""
-    at = "" if rate_hz is None else f" at {rate_hz:.4g} Hz"
+    rate_text = "" if rate_hz is None else f" at {rate_hz:.4g} Hz"
     return Repair(
         "stamps_shared",
         most,
         f"Up to {most} rows share one time stamp (packets, or times without enough decimals); they were "
-        f"spread evenly{at}.",
+        f"spread evenly{rate_text}.",
     )
 
 

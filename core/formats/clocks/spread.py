@@ -58,8 +58,8 @@ def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: 
     shared = np.zeros(rows, np.bool_)
     if usual == 1 and (widths[knots] > 1).any():
         extra = _find_extra(stamps, widths, first, knots, step, rows)
-        kept = np.cumsum(~extra) - 1
-        first = kept[first]
+        new_index = np.cumsum(~extra) - 1
+        first = new_index[first]
         repeats = np.ones(rows, np.bool_)
         repeats[np.concatenate(([0], np.cumsum(widths)[:-1]))] = False
         shared = repeats & ~extra
@@ -79,10 +79,10 @@ def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: 
     np.add.at(gained, place, lost)
     slots += np.cumsum(gained)
     late = np.zeros(rows, np.bool_)
-    behind = delay - floor
-    kept_knots = behind > -_LOST if usual == 1 else np.ones(len(knots), np.bool_)
-    if usual == 1 and (behind > _LATE).any():
-        kept_knots &= behind <= _LOST
+    lag = delay - floor
+    kept_knots = lag > -_LOST if usual == 1 else np.ones(len(knots), np.bool_)
+    if usual == 1 and (lag > _LATE).any():
+        kept_knots &= lag <= _LOST
         row_of = np.flatnonzero(~extra)
         late[row_of[place[~kept_knots]]] = True
     x, y = slots[place[kept_knots]], stamp[kept_knots]
@@ -108,11 +108,11 @@ def _find_extra(stamps: Floats, widths: Ints, first: Ints, knots: Ints, step: fl
     extra = np.zeros(rows, np.bool_)
     delay = stamps[knots] / step - first[knots]
     for k in np.flatnonzero(widths[knots] > 1):
-        before = delay[max(0, k + 1 - _NEIGHBOURS) : k + 1]
-        after = delay[k + 1 : k + 1 + _NEIGHBOURS]
-        if not len(after):
+        previous_delays = delay[max(0, k + 1 - _NEIGHBOURS) : k + 1]
+        next_delays = delay[k + 1 : k + 1 + _NEIGHBOURS]
+        if not len(next_delays):
             continue
-        more = round(float(np.median(before) - np.median(after)) - 0.15)
+        more = round(float(np.median(previous_delays) - np.median(next_delays)) - 0.15)
         if more > 0:
             run = knots[k]
             start, end = first[run], first[run] + widths[run]

@@ -30,7 +30,7 @@ class Packets:
     Parameters
     ----------
     first : (m,) row at which each run begins. stamps : (m,) of each. step : of one row, in the unit of the
-        stamps; None = cannot be told. usual : rows of a usual run, 1 = every row has its own stamp.
+        stamps; None = unknown. usual : rows of a usual run, 1 = every row has its own stamp.
     """
 
     first: Ints
@@ -48,8 +48,8 @@ def find_packets(x: Floats) -> Packets:
     new = np.concatenate(([True], x[1:] != x[:-1]))
     if is_bursty(x):
         d = np.diff(x)
-        between = np.concatenate(([True], (d > _burst_limit(d)) | (d < 0)))
-        new &= between
+        is_boundary = np.concatenate(([True], (d > _burst_limit(d)) | (d < 0)))
+        new &= is_boundary
     first = np.flatnonzero(new)
     widths = np.diff(first, append=len(x))
     usual = int(np.quantile(np.repeat(widths, widths), 0.4)) if len(first) > 2 else len(x)
@@ -95,8 +95,8 @@ def _measure_step(stamps: Floats, widths: Ints, usual: int) -> float | None:
             continue
         clean = np.flatnonzero(broken[m:] == broken[:-m])
         if len(clean) >= max(20, 0.15 * len(stamps)) or (m == _WINDOWS[-1] and len(clean)):
-            at = np.concatenate(([0], np.cumsum(widths)))
-            spans = (stamps[clean + m] - stamps[clean]) / (at[clean + m] - at[clean])
+            offsets = np.concatenate(([0], np.cumsum(widths)))
+            spans = (stamps[clean + m] - stamps[clean]) / (offsets[clean + m] - offsets[clean])
             middle = float(np.median(spans))
             near = np.abs(spans - middle) < 0.05 * abs(middle)
             return float(spans[near].mean())

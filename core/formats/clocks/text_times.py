@@ -53,15 +53,15 @@ def looks_like_time(cell: str) -> bool:
 def parse_times(column: pa.ChunkedArray[Any] | pa.Array[Any]) -> Floats:
     """Seconds of a column of texts (n,), NaN where one is no time: since 1970 with a date, else of the day.
 
-    Times without a zone are taken as they are.
+    Times without a zone are interpreted as UTC.
     """
     texts = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
     chosen = _choose(texts.slice(0, 200))
     if chosen is None:
         return np.full(len(texts), np.nan)
     kind, pattern = chosen
-    found = pc.extract_regex(texts, pattern)
-    parts = {f.name: pc.struct_field(found, f.name) for f in found.type}
+    matches = pc.extract_regex(texts, pattern)
+    parts = {f.name: pc.struct_field(matches, f.name) for f in matches.type}
     hour, minute, second = (_number(parts[name]) for name in ("hour", "minute", "second"))
     seconds = _halves(hour, parts["half"]) * 3600.0 + minute * 60.0 + np.nan_to_num(second)
     seconds = seconds + _fraction(parts["fraction"])
@@ -72,12 +72,12 @@ def parse_times(column: pa.ChunkedArray[Any] | pa.Array[Any]) -> Floats:
 
 def _choose(texts: pa.Array[Any]) -> tuple[str, str] | None:
     """The pattern that reads most of some texts."""
-    known = texts.drop_null()
-    if not len(known):
+    non_null = texts.drop_null()
+    if not len(non_null):
         return None
-    best, most = None, _LEAST * len(known)
+    best, most = None, _LEAST * len(non_null)
     for kind, pattern in _PATTERNS:
-        count = pc.sum(pc.match_substring_regex(known, pattern)).as_py() or 0
+        count = pc.sum(pc.match_substring_regex(non_null, pattern)).as_py() or 0
         if count > most:
             best, most = (kind, pattern), count
     return best
@@ -97,17 +97,19 @@ def _fraction(part: pa.Array[Any]) -> Floats:
 def _halves(hour: Floats, half: pa.Array[Any]) -> Floats:
     """Hours of the day from those of a 12-hour clock."""
     first = pc.utf8_lower(pc.utf8_slice_codeunits(half, 0, 1))
-    after = np.asarray(pc.fill_null(pc.equal(first, "p"), False).to_numpy(zero_copy_only=False), np.bool_)
-    before = np.asarray(pc.fill_null(pc.equal(first, "a"), False).to_numpy(zero_copy_only=False), np.bool_)
-    return np.where(after & (hour < 12), hour + 12, np.where(before & (hour == 12), 0.0, hour))
+    is_pm = np.asarray(pc.fill_null(pc.equal(first, "p"), False).to_numpy(zero_copy_only=False), np.bool_)
+    is_am = np.asarray(pc.fill_null(pc.equal(first, "a"), False).to_numpy(zero_copy_only=False), np.bool_)
+    return np.where(is_pm & (hour < 12), hour + 12, np.where(is_am & (hour == 12), 0.0, hour))
 
 
 def _zone(part: pa.Array[Any]) -> Floats:
     """Seconds by which a zone is ahead of UTC; 0 without one."""
-    found = pc.extract_regex(part, r"^(?P<sign>[+-])(?P<hours>\d{2}):?(?P<minutes>\d{2})?$")
-    hours = np.nan_to_num(_number(pc.struct_field(found, "hours")))
-    minutes = np.nan_to_num(_number(pc.struct_field(found, "minutes")))
-    minus = pc.fill_null(pc.equal(pc.struct_field(found, "sign"), "-"), False).to_numpy(zero_copy_only=False)
+    matches = pc.extract_regex(part, r"^(?P<sign>[+-])(?P<hours>\d{2}):?(?P<minutes>\d{2})?$")
+    hours = np.nan_to_num(_number(pc.struct_field(matches, "hours")))
+    minutes = np.nan_to_num(_number(pc.struct_field(matches, "minutes")))
+    minus = pc.fill_null(pc.equal(pc.struct_field(matches, "sign"), "-"), False).to_numpy(
+        zero_copy_only=False
+    )
     return np.where(np.asarray(minus, np.bool_), -1.0, 1.0) * (hours * 3600.0 + minutes * 60.0)
 
 

@@ -65,14 +65,14 @@ def find_wrap(x: Floats, step: float, usual: int, tick: float, *, seconds: bool)
     for wrap, name in ranges:
         if low < 0 or top >= wrap * (1 + 1e-9) or wrap < _LEAST_STEPS * step or top < 0.75 * wrap:
             continue
-        at = np.flatnonzero(d < -0.6 * wrap)
-        left_over = d[at] + wrap
-        if not len(at) or (left_over > _MOST_LOST * wrap).any():
+        drops = np.flatnonzero(d < -0.6 * wrap)
+        left_over = d[drops] + wrap
+        if not len(drops) or (left_over > _MOST_LOST * wrap).any():
             continue
         if float(np.median(left_over)) > max(_FEW_STEPS * usual * step, _CLOSE * wrap):
             continue  # the clock ended somewhere else: it was started again
         # what is left of the steps down there, and how near the end of the range the stamps come
-        left = float(np.median(np.abs(d[at] + wrap - step))) + max(0.0, wrap - top - 2 * step)
+        left = float(np.median(np.abs(d[drops] + wrap - step))) + max(0.0, wrap - top - 2 * step)
         if best is None or left < best[0]:
             best = left, wrap, name
     return None if best is None else (best[1], best[2])

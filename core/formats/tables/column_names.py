@@ -1,4 +1,4 @@
-"""What the name of a column, or of a file, says: sensor, quantity, axis, unit; or that it is a time."""
+"""Sensor, quantity, axis and unit from the name of a column or file, and recognition of time columns."""
 
 from __future__ import annotations
 
@@ -90,22 +90,26 @@ def read_name(name: str, file_kind: str | None = None) -> tuple[str, str, str, s
     """
     unit = ""
     plain = name.strip()
-    if said := _UNIT.search(plain) or _TRAILING.search(plain):
-        unit, plain = said["unit"].strip().lower(), plain[: said.start()].strip()
+    if name_match := _UNIT.search(plain) or _TRAILING.search(plain):
+        unit, plain = name_match["unit"].strip().lower(), plain[: name_match.start()].strip()
         unit = _SAID.get(unit, unit)
     plain = _CHANNEL.sub("", plain)
-    if alone := _AXIS_FIRST.match(plain):
+    if axis_match := _AXIS_FIRST.match(plain):
         kind = _UNIT_KINDS.get(unit) or file_kind
         kind = file_kind if file_kind in ("linear", "gravity") and kind == "acc" else kind
-        return None if kind is None else ("", kind, alone["axis"].lower(), _known(unit))
+        return None if kind is None else ("", kind, axis_match["axis"].lower(), _known(unit))
     if (axis := _AXIS.match(plain)) is None:
         return None
-    rest = axis["rest"]
+    remainder = axis["rest"]
     for kind, pattern in _KINDS:
-        if said := pattern.search(rest):
+        if name_match := pattern.search(remainder):
             if kind == "free":
                 return None
-            sensor = re.sub(r"[\s_./\-:]+$|^[\s_./\-:]+", "", rest[: said.start()] + " " + rest[said.end() :])
+            sensor = re.sub(
+                r"[\s_./\-:]+$|^[\s_./\-:]+",
+                "",
+                remainder[: name_match.start()] + " " + remainder[name_match.end() :],
+            )
             return re.sub(r"\s+", " ", sensor).strip(), kind, axis["axis"].lower(), _known(unit)
     if short := _SHORT.match(plain):
         sensor = re.sub(r"[\s_./\-:]+$", "", short["sensor"] or "")
@@ -129,17 +133,17 @@ def _known(unit: str) -> str:
 
 
 def read_file_kind(name: str) -> tuple[str | None, str]:
-    """Quantity that a file's name says, and the name of its sensor, without what says it.
+    """Quantity given in a file name, and the name of the sensor: the rest of the file name.
 
     "MetaWear_2023_C2B2CE9BB701_Gyroscope_100Hz.csv" is of sensor C2B2CE9BB701, "left_foot_Gyroscope.csv" of
-    left_foot, "Accelerometer.csv" of the folder it is in, else "sensor".
+    left_foot, "Accelerometer.csv" of its folder, else "sensor".
     """
     stem = stem_of(name)
     for kind, pattern in _FILE_KINDS:
-        if said := pattern.search(stem):
+        if match := pattern.search(stem):
             if address := _ADDRESS.search(stem):
                 return kind, address[1]
-            before = stem[: said.start()].strip("_-. ")
+            prefix = stem[: match.start()].strip("_-. ")
             folder = name.replace("\\", "/").rsplit("/", 2)[-2] if "/" in name.replace("\\", "/") else ""
-            return kind, before or stem[said.end() :].strip("_-. ") or folder or "sensor"
+            return kind, prefix or stem[match.end() :].strip("_-. ") or folder or "sensor"
     return None, stem

@@ -20,22 +20,24 @@ def join_titles(header: list[bytes], rows: list[bytes], separator: bytes, spec: 
 
 
 def find_header(
-    lines: list[bytes], spec: SourceSpec, found: TableLayout | None, known: bytes | None
+    lines: list[bytes], spec: SourceSpec, layout: TableLayout | None, declared_separator: bytes | None
 ) -> tuple[int, int]:
     """Lines before the header and of it: as declared, else where the declared columns are named."""
     if spec.skip_rows is not None:
         return spec.skip_rows, 1 if spec.header_rows is None else spec.header_rows
-    if found is None:
+    if layout is None:
         return 0, 1 if spec.header_rows is None else spec.header_rows
     if spec.header_rows is not None:
-        return max(0, found.first_row - spec.header_rows), spec.header_rows
-    asked = {name.split("#")[0] for _, channels in spec.columns.items() for _, name in list_asked(channels)}
-    asked |= {name for name in (spec.time_column, name_counter(spec)) if name is not None}
-    separator = known or found.separator
-    candidates = [(found.skip_rows, found.header_rows), *((i, 1) for i in range(found.first_row))]
+        return max(0, layout.first_row - spec.header_rows), spec.header_rows
+    required_columns = {
+        name.split("#")[0] for _, channels in spec.columns.items() for _, name in list_asked(channels)
+    }
+    required_columns |= {name for name in (spec.time_column, name_counter(spec)) if name is not None}
+    separator = declared_separator or layout.separator
+    candidates = [(layout.skip_rows, layout.header_rows), *((i, 1) for i in range(layout.first_row))]
     for skip, header in candidates:
-        titles = join_titles(lines[skip : skip + header], lines[found.first_row :], separator, spec)
-        if asked <= {*titles, *text.number_columns(titles)}:
+        titles = join_titles(lines[skip : skip + header], lines[layout.first_row :], separator, spec)
+        if required_columns <= {*titles, *text.number_columns(titles)}:
             return skip, header
     return candidates[0]
 
@@ -57,27 +59,27 @@ def find_titles(header: list[bytes], row: bytes, separator: bytes, spec: SourceS
 def list_wanted(spec: SourceSpec, titles: list[str], source: str) -> list[str]:
     """Columns that an entry asks for; raises ManifestError `unknown_column`, `ambiguous_column`."""
     names = text.number_columns(titles)
-    there = names[1:] if spec.index_column else names
-    wanted: list[str] = []
-    asked = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in list_asked(c)]
+    data_columns = names[1:] if spec.index_column else names
+    column_names: list[str] = []
+    requests = [(f"columns.{d}.{kind}", n) for d, c in spec.columns.items() for kind, n in list_asked(c)]
     for path, clock in (("time_column", spec.time_column), ("counter.column", name_counter(spec))):
         if clock is not None:
-            asked.append((path, clock))
-            there = names
-    for path, name in asked:
+            requests.append((path, clock))
+            data_columns = names
+    for path, name in requests:
         if name not in names and name in titles:
             raise ManifestError(
                 "ambiguous_column",
                 f"{path}: expected the name of one column, but {titles.count(name)} columns of {source} are "
                 f"called '{name}'. Give one of these names: {text.describe_columns(titles, name)}.",
             )
-        if name not in there:
-            near = difflib.get_close_matches(name, there, 1, 0.4)
-            hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(there[:20])}."
+        if name not in data_columns:
+            near = difflib.get_close_matches(name, data_columns, 1, 0.4)
+            hint = f"did you mean '{near[0]}'?" if near else f"columns found: {', '.join(data_columns[:20])}."
             raise ManifestError("unknown_column", f"{path}: {source} has no column '{name}'; {hint}")
-        if name not in wanted:
-            wanted.append(name)
-    return wanted
+        if name not in column_names:
+            column_names.append(name)
+    return column_names
 
 
 def complete_names(spec: SourceSpec, titles: list[str]) -> SourceSpec:
@@ -90,10 +92,10 @@ def complete_names(spec: SourceSpec, titles: list[str]) -> SourceSpec:
     def complete(group: tuple[str, ...] | None) -> tuple[str, ...] | None:
         if group is None or group[0] not in names:
             return group
-        at = names.index(group[0])
-        beside = tuple(titles[at : at + len(group)])
-        alike = all(a in (b, n) for a, b, n in zip(group, beside, names[at:], strict=False))
-        return tuple(names[at : at + len(group)]) if len(beside) == len(group) and alike else group
+        start = names.index(group[0])
+        title_group = tuple(titles[start : start + len(group)])
+        alike = all(a in (b, n) for a, b, n in zip(group, title_group, names[start:], strict=False))
+        return tuple(names[start : start + len(group)]) if len(title_group) == len(group) and alike else group
 
     columns = {
         d: Channels(*map(complete, (c.acc, c.gyr, c.mag, c.quat, c.linear, c.gravity)))

@@ -63,26 +63,31 @@ def find_layout(lines: Sequence[bytes], separator: bytes | None = None) -> Table
                 break
     if best is None:
         return None
-    _, width, found, first = best
-    header = _count_header(lines, first, width, found)
-    named = cells(lines[first - 1], found) if header else []
+    _, width, best_separator, first = best
+    header = _count_header(lines, first, width, best_separator)
+    named = cells(lines[first - 1], best_separator) if header else []
     return TableLayout(
-        found, first - header, header, width, len(named) == width - 1, has_decimal_comma(lines[first:], found)
+        best_separator,
+        first - header,
+        header,
+        width,
+        len(named) == width - 1,
+        has_decimal_comma(lines[first:], best_separator),
     )
 
 
 def guess_separator(rows: Sequence[bytes]) -> bytes | None:
     """The separator that cuts rows without a header into most numbers, all into as many cells."""
     best: tuple[int, int] = (0, 1)
-    found = None
+    best_separator = None
     for separator in text.SEPARATORS:
         cut = [cells(row, separator) for row in rows if row.strip()]
         if len({len(row) for row in cut}) != 1:
             continue
         score = min(count_numbers(row, separator) for row in cut), len(cut[0])
         if score > best and score[1] > 1:
-            best, found = score, separator
-    return found
+            best, best_separator = score, separator
+    return best_separator
 
 
 def has_decimal_comma(rows: Sequence[bytes], separator: bytes) -> bool:
@@ -92,9 +97,9 @@ def has_decimal_comma(rows: Sequence[bytes], separator: bytes) -> bool:
     commas = points = 0
     for row in rows[:LINES]:
         if b"," in row:
-            found = cells(row, separator)
-            commas += sum(_COMMA.fullmatch(c) is not None for c in found)
-            points += sum(_POINT.fullmatch(c) is not None for c in found)
+            row_cells = cells(row, separator)
+            commas += sum(_COMMA.fullmatch(c) is not None for c in row_cells)
+            points += sum(_POINT.fullmatch(c) is not None for c in row_cells)
     return commas > points
 
 
@@ -115,7 +120,7 @@ def count_numbers(row: Sequence[str], separator: bytes) -> int:
 
 
 def is_row(row: Sequence[str], numbers: int) -> bool:
-    """Whether so many numbers make a row of measured values: blanks and few texts beside them do no harm."""
+    """Whether a row with this many numbers holds measured values; blanks and a few texts are tolerated."""
     texts = len(row) - numbers - sum(cell in text.MISSING for cell in row)
     return numbers >= _LEAST_CELLS and texts <= max(1.0, _MOST_TEXTS * len(row))
 

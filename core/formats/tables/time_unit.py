@@ -1,4 +1,4 @@
-"""The unit of a column of time: as its name says and as its steps allow."""
+"""Unit of a time column, from its name and its steps."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ _DAY: Final = 86_400.0
 
 def read_unit(column: str) -> str | None:
     """The unit that the name of a column ends with."""
-    found = _NAMED.search(column)
-    if found is None:
+    match = _NAMED.search(column)
+    if match is None:
         return None
-    word = found["unit"].lower()
+    word = match["unit"].lower()
     if word.startswith(("mi", "ms")):
         return "us" if word.startswith("mic") else "ms"
     return _UNITS[word[0]]
@@ -40,15 +40,15 @@ def read_unit(column: str) -> str | None:
 
 def measure_step(values: Floats) -> float | None:
     """Usual step from row to row of a column, in its own unit; None where it does not count."""
-    known = values[np.isfinite(values)][:_ROWS]
-    if len(known) < 3 or np.ptp(known) < _LEAST:
+    finite_values = values[np.isfinite(values)][:_ROWS]
+    if len(finite_values) < 3 or np.ptp(finite_values) < _LEAST:
         return None
-    step = find_packets(known).step
+    step = find_packets(finite_values).step
     return step if step and step > _LEAST else None
 
 
 def find_tick(column: str, values: Floats, rate_hz: float | None, source: str) -> float:
-    """Length of the column's unit in s, where nobody has declared it.
+    """Length of the column's unit in s, for columns without a declared unit.
 
     Raises
     ------
@@ -87,11 +87,11 @@ def check_tick(column: str, values: Floats, unit: str, source: str) -> None:
     rate = 1.0 / (step * TIME_UNITS[unit])
     fitting = _fitting(step, None)
     if not 0.25 * RATES[0] <= rate <= 5.0 * RATES[1] and fitting:
-        other = fitting[0]
+        alternative = fitting[0]
         raise ManifestError(
             "wrong_time_unit",
-            f"{source}: column '{column}' in '{unit}' would mean {rate:.3g} rows per second; in '{other}' it "
-            f"is {1.0 / (step * TIME_UNITS[other]):.4g}. Correct time_unit.",
+            f"{source}: column '{column}' in '{unit}' would mean {rate:.3g} rows per second; "
+            f"in '{alternative}' it is {1.0 / (step * TIME_UNITS[alternative]):.4g}. Correct time_unit.",
         )
 
 

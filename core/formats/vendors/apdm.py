@@ -86,16 +86,16 @@ def _read_studio(data: bytes, source: str, spec: SourceSpec | None) -> tuple[Dra
 def _read_lab(data: bytes, source: str, spec: SourceSpec | None) -> tuple[Draft, ...]:
     """Lines of keys, a header line "Time,label/signal/axis, …", a line of units, rows with the time in s."""
     lines = text.head_lines(data, _LAB_LINES)
-    at = next((i for i, line in enumerate(lines) if line.startswith(b"Time,")), None)
-    if at is None or at + 1 >= len(lines):
+    header_row = next((i for i, line in enumerate(lines) if line.startswith(b"Time,")), None)
+    if header_row is None or header_row + 1 >= len(lines):
         raise FormatError("empty", f"{source} has a header but no samples; export it again.")
-    names = text.split(lines[at], b",")
-    units = text.split(lines[at + 1], b",")
+    names = text.split(lines[header_row], b",")
+    units = text.split(lines[header_row + 1], b",")
     has_units = _NUMBER.fullmatch(units[0]) is None
     if has_units:
         _check_units(names, units, source)
     rate = _LAB_RATE.search(data[:8192])
-    body = text.after_lines(data, at + 1 + has_units)
+    body = text.after_lines(data, header_row + 1 + has_units)
     named = [name.replace("/Orientation/Scalar", "/Orientation/S") for name in names]
     unit = TIME_UNITS[units[0]] if has_units else 1.0
     return _read_table(
@@ -111,13 +111,13 @@ def _check_units(names: Sequence[str], units: Sequence[str], source: str) -> Non
             "export it again.",
         )
     for name, unit in zip(names, units, strict=False):
-        wanted = {"Acceleration": "m/s^2", "Angular Velocity": "rad/s"}.get(
+        expected_unit = {"Acceleration": "m/s^2", "Angular Velocity": "rad/s"}.get(
             name.split("/")[-2] if "/" in name else ""
         )
-        if wanted is not None and unit != wanted:
+        if expected_unit is not None and unit != expected_unit:
             raise FormatError(
                 "unknown_unit",
-                f"{source}: column '{name}' is in '{unit}', expected {wanted}; export it in SI units.",
+                f"{source}: column '{name}' is in '{unit}', expected {expected_unit}; export it in SI units.",
             )
 
 
@@ -138,8 +138,8 @@ def _read_table(
         raise FormatError(
             "missing_acc", f"{source} has no acceleration columns; export it again with raw data."
         )
-    wanted = ["Time", *(c for m in monitors for group in m.columns.values() for c in group)]
-    table = text.read_columns(body, source, b",", columns, wanted, decimal_comma=False)
+    selection = ["Time", *(c for m in monitors for group in m.columns.values() for c in group)]
+    table = text.read_columns(body, source, b",", columns, selection, decimal_comma=False)
     acc_unit = ACC_UNITS[(spec and spec.acc_unit) or "m/s2"]
     gyr_unit = GYR_UNITS[(spec and spec.gyr_unit) or "rad/s"]
     drafts = []
@@ -166,15 +166,15 @@ def _read_table(
 
 def _find_monitors(columns: Sequence[str]) -> list[_Monitor]:
     """Monitors with an acceleration, in the order of the file."""
-    there = set(columns)
+    column_set = set(columns)
     labels = dict.fromkeys(c.rsplit("/", 2)[0] for c in columns if c.count("/") >= 2)
-    found = []
+    monitors = []
     for label in labels:
         groups = {
             kind: group
-            for said, kind in _KINDS.items()
-            if set(group := tuple(f"{label}/{said}/{axis}" for axis in _AXES[kind])) <= there
+            for quantity, kind in _KINDS.items()
+            if set(group := tuple(f"{label}/{quantity}/{axis}" for axis in _AXES[kind])) <= column_set
         }
         if "acc" in groups:
-            found.append(_Monitor(label, groups))
-    return found
+            monitors.append(_Monitor(label, groups))
+    return monitors

@@ -84,18 +84,18 @@ class _Tree:
 
     def array(self, path: str, width: int) -> Floats | None:
         """Numbers (n, width), or (n,) if the width is 1; None if absent."""
-        found = self._get(path)
-        if found is None:
+        dataset = self._get(path)
+        if dataset is None:
             return None
-        shape = (len(found), width) if width > 1 else (len(found),)
-        if tuple(found.shape) != shape or found.dtype.kind not in "fiu":
-            raise self._bad(f"{path} has shape {found.shape}, expected {shape}")
-        if found.is_virtual or found.external is not None:
+        shape = (len(dataset), width) if width > 1 else (len(dataset),)
+        if tuple(dataset.shape) != shape or dataset.dtype.kind not in "fiu":
+            raise self._bad(f"{path} has shape {dataset.shape}, expected {shape}")
+        if dataset.is_virtual or dataset.external is not None:
             raise self._bad(f"{path} lies in another file")
-        self._values += found.size
+        self._values += dataset.size
         if self._values > _MOST_VALUES:
             raise self._bad("it declares more numbers than a day of recording")
-        return np.asarray(found[()], np.float64)
+        return np.asarray(dataset[()], np.float64)
 
     def said(self, path: str, name: str) -> str:
         """An attribute of a group as text, empty if absent."""
@@ -105,18 +105,18 @@ class _Tree:
         return text.strip("\0 ")
 
     def _get(self, path: str) -> Any:
-        at = self._root
+        node = self._root
         for part in path.split("/"):
-            link = at.get(part, getlink=True)
+            link = node.get(part, getlink=True)
             if link is None:
                 return None
             if type(link).__name__ != "HardLink":
                 raise self._bad(f"{path} is a link")
-            at = at[part]
-        return at
+            node = node[part]
+        return node
 
-    def _bad(self, why: str) -> FormatError:
-        return FormatError("bad_hdf5", f"{self._source} is not readable: {why}. Export it again.")
+    def _bad(self, reason: str) -> FormatError:
+        return FormatError("bad_hdf5", f"{self._source} is not readable: {reason}. Export it again.")
 
 
 def _read_monitors(tree: _Tree, source: str, spec: SourceSpec | None) -> tuple[Draft, ...]:
@@ -127,20 +127,20 @@ def _read_monitors(tree: _Tree, source: str, spec: SourceSpec | None) -> tuple[D
         )
     drafts = []
     for monitor in monitors:
-        at = f"Sensors/{monitor}"
-        acc, time = tree.array(f"{at}/Accelerometer", 3), tree.array(f"{at}/Time", 1)
+        prefix = f"Sensors/{monitor}"
+        acc, time = tree.array(f"{prefix}/Accelerometer", 3), tree.array(f"{prefix}/Time", 1)
         if acc is None or time is None or len(acc) != len(time):
             raise FormatError(
                 "missing_acc",
                 f"{source}: monitor {monitor} has no acceleration with times; export it again with raw data.",
                 sensor=monitor,
             )
-        config = f"{at}/Configuration"
+        config = f"{prefix}/Configuration"
         gyr, mag, quat = (
             x if x is not None and len(x) == len(acc) else None
             for x in (
-                tree.array(f"{at}/Gyroscope", 3),
-                tree.array(f"{at}/Magnetometer", 3),
+                tree.array(f"{prefix}/Gyroscope", 3),
+                tree.array(f"{prefix}/Magnetometer", 3),
                 tree.array(f"Processed/{monitor}/Orientation", 4),
             )
         )
@@ -161,9 +161,9 @@ def _read_monitors(tree: _Tree, source: str, spec: SourceSpec | None) -> tuple[D
     return tuple(drafts)
 
 
-def _rate(said: str) -> float | None:
+def _rate(rate_text: str) -> float | None:
     try:
-        rate = float(said)
+        rate = float(rate_text)
     except ValueError:
         return None
     return rate if 1.0 <= rate <= 10_000.0 else None

@@ -222,26 +222,26 @@ def _decode(heads: NDArray[Any], raw: NDArray[np.uint8], source: str) -> _Decode
         raise FormatError(
             "bad_cwa", f"{source} has blocks of {axes} axes in packing {packing}; expected 3 or 6 axes."
         )
-    there = None if count.min() == room else np.arange(room) < count[:, None]
+    valid = None if count.min() == room else np.arange(room) < count[:, None]
     body = np.ascontiguousarray(raw[:, _DATA : _DATA + 480])
     gyr = None
     light = heads["light"].astype(np.int64)
     if packing == 0:
-        acc = np.asarray(_select(_unpack(body.view("<u4")), there) * (GRAVITY / 256.0))
+        acc = np.asarray(_select(_unpack(body.view("<u4")), valid) * (GRAVITY / 256.0))
     else:
         values = body.view("<i2").reshape(len(heads), room, axes)
         per_g = 2.0 ** (8 + (light >> 13))
-        acc = np.asarray(_select(values[:, :, -3:], there) * np.repeat(GRAVITY / per_g, count)[:, None])
+        acc = np.asarray(_select(values[:, :, -3:], valid) * np.repeat(GRAVITY / per_g, count)[:, None])
         if axes == 6:
             full_dps = 8000.0 / 2.0 ** ((light >> 10) & 7)
             scale = np.repeat(np.radians(full_dps) / 32768.0, count)[:, None]
-            gyr = np.asarray(_select(values[:, :, :3], there) * scale)
+            gyr = np.asarray(_select(values[:, :, :3], valid) * scale)
     return _Decoded(_starts(heads), count, acc, gyr)
 
 
-def _select(values: NDArray[Any], there: NDArray[np.bool_] | None) -> NDArray[Any]:
+def _select(values: NDArray[Any], valid: NDArray[np.bool_] | None) -> NDArray[Any]:
     """Existing samples (n, 3) of blocks (b, room, 3); None = all of them."""
-    return values.reshape(-1, 3) if there is None else values[there]
+    return values.reshape(-1, 3) if valid is None else values[valid]
 
 
 def _unpack(words: NDArray[np.uint32]) -> NDArray[np.int32]:
@@ -266,10 +266,10 @@ def _time(blocks: _Decoded, number: int, rate: float, origin_s: float) -> Sample
     n = int(count.sum())
     start = blocks.start_s[:number] - origin_s
     if n and count.min() == count.max():
-        within = np.arange(count[0]) / count[0]
-        t_s = (start[:, None] + within * lasts[:, None]).ravel()
+        fraction = np.arange(count[0]) / count[0]
+        t_s = (start[:, None] + fraction * lasts[:, None]).ravel()
     else:
         first = np.cumsum(count) - count
-        within = (np.arange(n) - np.repeat(first, count)) / np.repeat(np.maximum(count, 1), count)
-        t_s = np.repeat(start, count) + within * np.repeat(lasts, count)
+        fraction = (np.arange(n) - np.repeat(first, count)) / np.repeat(np.maximum(count, 1), count)
+        t_s = np.repeat(start, count) + fraction * np.repeat(lasts, count)
     return SampleBlock(t_s, blocks.acc[:n], None if blocks.gyr is None else blocks.gyr[:n])

@@ -122,8 +122,8 @@ def _times(events: Sequence[dict[str, Any]]) -> Floats:
 def _vectors(events: Sequence[dict[str, Any]], name: str, parts: tuple[str, str, str]) -> Floats:
     """Three numbers (n, 3) of every event; NaN if missing."""
     x, y, z = parts
-    found = [e.get(name) or {} for e in events]
-    return _numbers([v for f in found for v in (f.get(x), f.get(y), f.get(z))]).reshape(-1, 3)
+    vectors = [e.get(name) or {} for e in events]
+    return _numbers([v for f in vectors for v in (f.get(x), f.get(y), f.get(z))]).reshape(-1, 3)
 
 
 def _numbers(values: Sequence[float | None]) -> Floats:
@@ -161,6 +161,6 @@ def _find_order(t_s: Floats, acc: Floats, rates: Floats) -> tuple[str, bool]:
         angle = np.arctan2(crossed, np.sum(expected * g[starts + steps], axis=1))
         # the windows that turn most tell the readings apart
         errors[name] = float(np.quantile(angle, 0.9))
-    best, other = sorted(errors, key=lambda name: errors[name])
-    sure = errors[best] < _FITS and errors[other] > _OTHERS
+    best, runner_up = sorted(errors, key=lambda name: errors[name])
+    sure = errors[best] < _FITS and errors[runner_up] > _OTHERS
     return (best if sure else first), sure

@@ -52,25 +52,25 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     """
     lines = text.head_lines(data, _HEAD)
     separator = text.read_separator(lines[0]) or b","
-    at, says = _read_keys(lines, separator, source)
+    header_row, says = _read_keys(lines, separator, source)
     device = _device(says, source)
-    names = text.split(lines[at], separator)
+    names = text.split(lines[header_row], separator)
     if not set(_ACC) <= set(names):
         raise _no_acc(source, device, names, says)
-    body = text.after_lines(data, at + 1)
+    body = text.after_lines(data, header_row + 1)
     names = text.fit_names(names, body, separator)
     groups = [g for g in (_ACC, _GYR, _MAG, _QUAT) if set(g) <= set(names)]
-    wanted = [c for c in (_COUNTER, _FINE) if c in names] + [c for g in groups for c in g]
+    selection = [c for c in (_COUNTER, _FINE) if c in names] + [c for g in groups for c in g]
     table = text.read_columns(
         body,
         source,
         separator,
         names,
-        wanted,
+        selection,
         decimal_comma=has_decimal_comma(first_rows(body), separator),
     )
     rate = spec.rate_hz if spec and spec.rate_hz else _rate(says)
-    clock, ticks, wrap, told = _read_clock(table, says, source)
+    clock, ticks, wrap, clock_notices = _read_clock(table, says, source)
     return (
         make_draft(
             device,
@@ -84,7 +84,7 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
             mag=table.stack(_MAG) if _MAG in groups else None,
             quat=table.stack(_QUAT) if _QUAT in groups else None,
             rate_hz=rate,
-            notices=[*table.notices, *told],
+            notices=[*table.notices, *clock_notices],
             wrap=wrap,
             segment=segment_in(says.get("devicetag", "")),
         ),
@@ -93,18 +93,18 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
 
 def _read_keys(lines: Sequence[bytes], separator: bytes, source: str) -> tuple[int, dict[str, str]]:
     """Index of the header line, and values by key from the lines before it."""
-    at = next(
+    header_row = next(
         (i for i, line in enumerate(lines) if _COUNTER in text.split(line, separator) and b":" not in line),
         None,
     )
-    if at is None:
+    if header_row is None:
         raise FormatError("bad_table", f"{source} has no header line with {_COUNTER}; export it again.")
     says = {
         cells[0].rstrip(": ").lower(): cells[1]
-        for line in lines[:at]
+        for line in lines[:header_row]
         if (cells := text.split(line, separator))[1:]
     }
-    return at, says
+    return header_row, says
 
 
 def _read_clock(
@@ -127,8 +127,8 @@ def _device(says: Mapping[str, str], source: str) -> str:
 
 
 def _rate(says: Mapping[str, str]) -> float | None:
-    found = _RATE.search(says.get("outputrate", ""))
-    return float(found[1]) if found and float(found[1]) >= 1.0 else None
+    match = _RATE.search(says.get("outputrate", ""))
+    return float(match[1]) if match and float(match[1]) >= 1.0 else None
 
 
 def _unsynchronised(source: str) -> Notice:

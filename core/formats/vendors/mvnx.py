@@ -77,7 +77,7 @@ class _Reader:
         self._part: list[str] | None = None
         self._depth = 0
 
-    def begin(self, tag: str, given: Mapping[str, str]) -> None:
+    def begin(self, tag: str, attributes: Mapping[str, str]) -> None:
         """Handle the start of an element."""
         name = tag.rsplit(":", 1)[-1] if ":" in tag else tag
         if self._frame is not None:
@@ -87,13 +87,13 @@ class _Reader:
             if self._depth == 1 and name in _WIDTHS:
                 self._said[name] = self._part = []
         elif name == "frame":
-            self._frame, self._said, self._part, self._depth = given, {}, None, 0
-        elif name == "sensor" and (label := given.get("label")):
+            self._frame, self._said, self._part, self._depth = attributes, {}, None, 0
+        elif name == "sensor" and (label := attributes.get("label")):
             self._labels.append(label)
             if len(self._labels) > _MOST_SENSORS:
                 raise FormatError("bad_table", f"{self._source} names more than {_MOST_SENSORS} sensors.")
         elif name == "subject":
-            self._rate = _number(given.get("frameRate"))
+            self._rate = _number(attributes.get("frameRate"))
 
     def add_text(self, content: str) -> None:
         """Handle text of the innermost element."""
@@ -212,15 +212,15 @@ def _rates(q: Floats, index: Floats, rate_hz: float) -> Floats:
         return rates
     step_s = np.diff(index) / rate_hz
     turn = rotation.log(rotation.multiply(rotation.conjugate(q[:-1]), q[1:]))
-    between = turn / np.where(step_s > 0, step_s, np.nan)[:, None]
-    rates[1:-1] = (between[:-1] + between[1:]) / 2
-    rates[0], rates[-1] = between[0], between[-1]
+    step_rates = turn / np.where(step_s > 0, step_s, np.nan)[:, None]
+    rates[1:-1] = (step_rates[:-1] + step_rates[1:]) / 2
+    rates[0], rates[-1] = step_rates[0], step_rates[-1]
     return rates
 
 
-def _number(said: str | None) -> float | None:
+def _number(attribute: str | None) -> float | None:
     try:
-        value = float(said or "")
+        value = float(attribute or "")
     except ValueError:
         return None
     return value if np.isfinite(value) and abs(value) < 1e12 else None

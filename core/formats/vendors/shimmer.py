@@ -51,20 +51,27 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> tuple[Draf
     """
     separator = _separator(data)
     lines = text.head_lines(data, _HEAD)
-    at = next(i for i, line in enumerate(lines) if _parse(text.split(line, separator)))
+    header_row = next(i for i, line in enumerate(lines) if _parse(text.split(line, separator)))
     names, units = (
-        text.split(lines[at], separator),
-        text.split(lines[at + 1], separator) if at + 1 < len(lines) else [],
+        text.split(lines[header_row], separator),
+        text.split(lines[header_row + 1], separator) if header_row + 1 < len(lines) else [],
     )
-    body = text.after_lines(data, at + 2)
+    body = text.after_lines(data, header_row + 2)
     columns = text.fit_names(names, body, separator)
-    said = dict(zip(columns, units, strict=False))
+    column_units = dict(zip(columns, units, strict=False))
     devices = _parse(columns)
-    wanted = [c for group in devices.values() for c in group.values()]
+    selection = [c for group in devices.values() for c in group.values()]
     table = text.read_columns(
-        body, source, separator, columns, wanted, decimal_comma=has_decimal_comma(first_rows(body), separator)
+        body,
+        source,
+        separator,
+        columns,
+        selection,
+        decimal_comma=has_decimal_comma(first_rows(body), separator),
     )
-    return tuple(_sensor(device, group, said, table, source, spec) for device, group in devices.items())
+    return tuple(
+        _sensor(device, group, column_units, table, source, spec) for device, group in devices.items()
+    )
 
 
 def _separator(data: bytes) -> bytes:
@@ -77,19 +84,19 @@ def _parse(names: Sequence[str]) -> dict[str, dict[str, str]]:
     """Device → quantity ("Gyro_X") → column name, calibrated columns only."""
     out: dict[str, dict[str, str]] = {}
     for name in names:
-        found = _NAME.fullmatch(name)
-        if found is not None and found["kind"] == "CAL":
-            what = "Timestamp" if found["what"].startswith("Timestamp") else found["what"]
-            out.setdefault(found["device"], {}).setdefault(what, name)
-        elif found is not None:
-            out.setdefault(found["device"], {})
+        match = _NAME.fullmatch(name)
+        if match is not None and match["kind"] == "CAL":
+            quantity = "Timestamp" if match["what"].startswith("Timestamp") else match["what"]
+            out.setdefault(match["device"], {}).setdefault(quantity, name)
+        elif match is not None:
+            out.setdefault(match["device"], {})
     return out
 
 
 def _sensor(
     device: str,
     group: Mapping[str, str],
-    said: Mapping[str, str],
+    column_units: Mapping[str, str],
     table: text.Columns,
     source: str,
     spec: SourceSpec | None,
@@ -100,11 +107,11 @@ def _sensor(
             return None
         if units is None:
             return table.stack(columns)
-        unit = declared or _UNITS.get(said.get(columns[0], ""), "")
+        unit = declared or _UNITS.get(column_units.get(columns[0], ""), "")
         if unit not in units:
             raise FormatError(
                 "unknown_unit",
-                f"{source}: '{columns[0]}' is in '{said.get(columns[0], '')}', expected "
+                f"{source}: '{columns[0]}' is in '{column_units.get(columns[0], '')}', expected "
                 f"{' or '.join(units)}; export calibrated data.",
                 sensor=device,
             )
@@ -123,7 +130,7 @@ def _sensor(
         raise FormatError(
             "no_time", f"{source}: {device} has no calibrated time stamp; export it too.", sensor=device
         )
-    clock = said.get(group["Timestamp"], "").lower() or "ms"
+    clock = column_units.get(group["Timestamp"], "").lower() or "ms"
     if clock not in TIME_UNITS:
         raise FormatError(
             "unknown_unit",

@@ -62,8 +62,8 @@ def _layout(data: bytes) -> _Layout | None:
             continue
         for separator in (b"\t", b",", b";", b" "):
             names = text.split(line.rstrip(separator), separator)
-            known = any(set(g) <= set(names) for g in _GROUPS) or {"FreeAcc_X", "VelInc_X"} & set(names)
-            if known and "PacketCounter" in names:
+            has_signals = any(set(g) <= set(names) for g in _GROUPS) or {"FreeAcc_X", "VelInc_X"} & set(names)
+            if has_signals and "PacketCounter" in names:
                 return _Layout(comments, names, separator, i)
         return None
     return None
@@ -98,11 +98,11 @@ def read(data: bytes, source: str, spec: SourceSpec | None = None) -> Draft:
     groups = [g for g in _GROUPS if set(g) <= set(names)]
     if _ACC not in groups:
         raise _no_acc(source, device, names)
-    wanted = ["PacketCounter", *(c for g in groups for c in g)]
+    selection = ["PacketCounter", *(c for g in groups for c in g)]
     if "SampleTimeFine" in names:
-        wanted.append("SampleTimeFine")
+        selection.append("SampleTimeFine")
     comma = has_decimal_comma(lines, layout.separator)
-    table = text.read_columns(body, source, layout.separator, names, wanted, decimal_comma=comma)
+    table = text.read_columns(body, source, layout.separator, names, selection, decimal_comma=comma)
     notices = [*table.notices, *cut_notice(source, cut)]
     acc = table.stack(_ACC) * _factor(ACC_UNITS, spec.acc_unit if spec else None)
     gyr = _stack_known(table, _GYR, groups, _factor(GYR_UNITS, spec.gyr_unit if spec else None))
@@ -200,12 +200,12 @@ def _without_cut_end(body: memoryview, separator: bytes) -> tuple[memoryview, bo
     tail = bytes(body[-20_000:])
     if tail.endswith(b"\n") or b"\n" not in tail:
         return body, False
-    rest, last = tail.rsplit(b"\n", 1)
-    before = rest.rstrip(b"\r").rsplit(b"\n", 1)[-1].rsplit(separator, 1)[-1]
+    whole_lines, last = tail.rsplit(b"\n", 1)
+    previous_cell = whole_lines.rstrip(b"\r").rsplit(b"\n", 1)[-1].rsplit(separator, 1)[-1]
     cell = last.rsplit(separator, 1)[-1]
-    short = last.count(separator) == rest.rsplit(b"\n", 1)[-1].count(separator) and _decimals(
+    short = last.count(separator) == whole_lines.rsplit(b"\n", 1)[-1].count(separator) and _decimals(
         cell
-    ) < _decimals(before)
+    ) < _decimals(previous_cell)
     return (body[: len(body) - len(last)], True) if short else (body, False)
 
 
@@ -234,8 +234,8 @@ def _device_id(layout: _Layout, source: str) -> str:
         if m := _DEVICE.search(line):
             return m.group(1).decode().upper()
     stem = stem_of(source)
-    found = _ID_IN_NAME.findall(stem)
-    return str(found[-1]).upper() if found else stem
+    ids = _ID_IN_NAME.findall(stem)
+    return str(ids[-1]).upper() if ids else stem
 
 
 def _rate(layout: _Layout, table: text.Columns, spec: SourceSpec | None) -> float | None:

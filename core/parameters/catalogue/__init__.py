@@ -83,9 +83,9 @@ def require_entries(names: Iterable[str], user: str) -> None:
         )
 
 
-def list_names(group: str, of: Scope = "stride") -> tuple[str, ...]:
+def list_names(group: str, scope: Scope = "stride") -> tuple[str, ...]:
     """Names of one group in the order of the tables: per stride, or for the whole recording."""
-    return tuple(name for name, entry in CATALOGUE.items() if (entry.group, entry.of) == (group, of))
+    return tuple(name for name, entry in CATALOGUE.items() if (entry.group, entry.of) == (group, scope))
 
 
 def list_trainable() -> tuple[str, ...]:

@@ -94,9 +94,11 @@ def _angle(source: str, common: float, own: float) -> MeasurementErrors:
     return MeasurementErrors(source, common=common, own=own, random=1.0)
 
 
-def _range(of: MeasurementErrors) -> MeasurementErrors:
+def _range(errors: MeasurementErrors) -> MeasurementErrors:
     """Uncertainty of a range, the difference of two levels with possibly different errors."""
-    return MeasurementErrors(of.source, None, sqrt(2.0) * of.common, sqrt(2.0) * of.own, of.random)
+    return MeasurementErrors(
+        errors.source, None, sqrt(2.0) * errors.common, sqrt(2.0) * errors.own, errors.random
+    )
 
 
 HIP: Final = _angle("calibration of pelvis and thigh", 2.7, 1.5)

@@ -60,36 +60,38 @@ Figures = tuple[dict[str, Value], dict[str, Floats]]
 def early_figures(stride: Stride, span: StrideSpan, surface: Surface) -> Figures:
     """Parameters available at the contact that ends the stride; of distances only those given by a belt."""
     one = Strides((stride,))
-    found: dict[str, Value] = {}
+    figures: dict[str, Value] = {}
     for name, column in temporal_values(one).items():
         value = float(column[0])
-        found[name] = explain_missing(name, (stride,)) if isnan(value) else value
+        figures[name] = explain_missing(name, (stride,)) if isnan(value) else value
         if is_impossible(name, value):
-            found[name] = IMPOSSIBLE
+            figures[name] = IMPOSSIBLE
     pitch = foot_pitches(span)
     flat = find_stances(one, span.t_s, pitch)
     curves = cycle_curves(span.angles or NO_ANGLES, one)
-    found |= read_row({**flat.parts, **measure_phases(one, flat, span.angles, pitch, span.feet)}, 0)
+    figures |= read_row({**flat.parts, **measure_phases(one, flat, span.angles, pitch, span.feet)}, 0)
     read_from = list_curve_figures()
-    worn = dict.fromkeys(read_from, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
-    found |= worn | {"turning_angle_deg": "gap"}
+    angle_reasons = dict.fromkeys(read_from, "joint_missing") | dict.fromkeys(FOOT_PITCH, "no_foot_sensor")
+    figures |= angle_reasons | {"turning_angle_deg": "gap"}
     read = {**stride_figures(curves, read_from), **turning_angle(one), **foot_pitch(span, one, pitch)}
     for name, sides in read.items():
         values = sides.get(stride.side)
         if values is not None and len(values):
             value = float(values[0])
             reason = "no_terminal_contact" if name == FOOT_PITCH[1] and stride.tc_s is None else "gap"
-            if name in read_from and (why := curves.why.get(read_from[name].variable, {}).get(stride.side)):
-                reason = why
-            found[name] = value if isfinite(value) else reason
+            if name in read_from and (
+                suppression := curves.why.get(read_from[name].variable, {}).get(stride.side)
+            ):
+                reason = suppression
+            figures[name] = value if isfinite(value) else reason
     if surface.protocol == "treadmill" or span.feet is None or stride.side not in span.feet.p:
-        found |= read_row(measure_distances(one, span.feet, surface), 0)
+        figures |= read_row(measure_distances(one, span.feet, surface), 0)
     else:
-        found |= dict.fromkeys(SPATIAL, NOT_YET)
+        figures |= dict.fromkeys(SPATIAL, NOT_YET)
     # courses first, as in a take with both feet
     order = sorted(curves.curves.items(), key=lambda x: x[0] not in MEAN_ZERO)
-    rows = {name: of[stride.side][0] for name, of in order if stride.side in of}
-    return found, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
+    rows = {name: by_side[stride.side][0] for name, by_side in order if stride.side in by_side}
+    return figures, {name: row for name, row in rows.items() if bool(np.isfinite(row).all())}
 
 
 def late_figures(

@@ -60,8 +60,8 @@ class SampleHistory:
                 a[: self._kept] = a[drop : self._rows]
             self._first, self._rows = self._first + drop, self._kept
         for name, column in columns.items():
-            of = self._floats if name in self._floats else self._bools
-            of[name][self._rows : self._rows + count] = column
+            store = self._floats if name in self._floats else self._bools
+            store[name][self._rows : self._rows + count] = column
         self._rows += count
 
     def floats(self, name: str, first: int, past: int) -> Floats:

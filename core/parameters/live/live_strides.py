@@ -83,24 +83,24 @@ class LiveStrides:
         self._count = 0
         self._near = ceil(NEAR_S * setup.rate_hz) + 1
 
-    def push(self, known: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
+    def push(self, contacts: Iterable[KnownContact], history: SampleHistory) -> list[LiveStride]:
         """Strides completed by the contacts since the last call, or by the time elapsed."""
-        told: list[LiveStride] = []
-        for at, event, final in known:
-            told += self._given_up(at, history)
+        strides: list[LiveStride] = []
+        for sample, event, final in contacts:
+            strides += self._given_up(sample, history)
             if event.first_s is not None:
-                told += self._refined(at, event, history)
+                strides += self._refined(sample, event, history)
                 continue
             self._events.append(event)
             # as far back as the samples go
             while event.detected_s - self._events[0].time_s > KEPT_S + self._params.max_s:
                 self._events.popleft()
-            told += self._completed(at, history)
+            strides += self._completed(sample, history)
             if event.kind == "ic":
-                told += self._landed(at, event, history, final)
-        return told + self._given_up(history.length - 1, history)
+                strides += self._landed(sample, event, history, final)
+        return strides + self._given_up(history.length - 1, history)
 
-    def _refined(self, at: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
+    def _refined(self, sample: int, event: GaitEvent, history: SampleHistory) -> list[LiveStride]:
         """The stride ended by this contact, with its refined end."""
         for i, e in enumerate(self._events):
             if (e.side, e.kind, e.time_s) == (event.side, event.kind, event.first_s):
@@ -111,10 +111,10 @@ class LiveStrides:
         recent.pop()
         number = self._last.pop(event.side)
         self._pending = [p for p in self._pending if p.told.n != number]
-        return self._landed(at, event, history, True, number)
+        return self._landed(sample, event, history, True, number)
 
     def _landed(
-        self, at: int, event: GaitEvent, history: SampleHistory, refined: bool, number: int | None = None
+        self, sample: int, event: GaitEvent, history: SampleHistory, refined: bool, number: int | None = None
     ) -> list[LiveStride]:
         """The stride ended by this contact, if its start is within reach; `number`: of one reported
         before.
@@ -124,7 +124,7 @@ class LiveStrides:
         own = sorted(e.time_s for e in earlier if e.side == event.side and e.kind == "ic")
         if len(own) < 2 or own[-2] == own[-1]:  # two contacts may be refined to the same moment
             return []
-        first, past = self._sample(own[-2]) - 1, at + 1
+        first, past = self._sample(own[-2]) - 1, sample + 1
         if not history.reaches(first, past):
             return []
         span = self._span(first, past, history, event.side)
@@ -140,16 +140,16 @@ class LiveStrides:
         recent.append(stride)
         near = find_flags(tuple(recent), self._params)[-1]
         flags = tuple(f for f in add_flag(stride, *near).flags if f not in LATER)
-        found, curves = early_figures(stride, span, self._setup.surface)
-        values, reasons = _split(found)
+        figures, curves = early_figures(stride, span, self._setup.surface)
+        values, reasons = _split(figures)
         final = self._setup.surface.protocol == "treadmill" or event.side not in self._setup.feet
-        told = LiveStride(
+        live_stride = LiveStride(
             n=self._count if number is None else number,
             side=event.side,
             start_s=stride.start_s,
             foot_off_s=stride.tc_s,
             end_s=stride.end_s,
-            detected_s=(self._setup.first + at) / self._setup.rate_hz,
+            detected_s=(self._setup.first + sample) / self._setup.rate_hz,
             values=values,
             reasons=reasons,
             curves=curves,
@@ -158,22 +158,22 @@ class LiveStrides:
             counted=not flags,
             complete=final and refined,
         )
-        self._last[event.side] = told.n
+        self._last[event.side] = live_stride.n
         self._count += number is None
         if not final:
             wait = round(self._params.max_s * self._setup.rate_hz)
-            self._pending.append(_Pending(told, stride, self._sample(stride.end_s) + wait))
-        return [told]
+            self._pending.append(_Pending(live_stride, stride, self._sample(stride.end_s) + wait))
+        return [live_stride]
 
-    def _completed(self, at: int, history: SampleHistory) -> list[LiveStride]:
+    def _completed(self, sample: int, history: SampleHistory) -> list[LiveStride]:
         ready = [p for p in self._pending if self._left_again(p.stride)]
         self._pending = [p for p in self._pending if p not in ready]
-        return [self._complete(p, at, history) for p in ready]
+        return [self._complete(p, sample, history) for p in ready]
 
-    def _given_up(self, at: int, history: SampleHistory) -> list[LiveStride]:
+    def _given_up(self, sample: int, history: SampleHistory) -> list[LiveStride]:
         """Strides without a following step: a stop. Each at its own sample, independent of block sizes."""
-        ready = sorted((p for p in self._pending if p.until <= at), key=lambda p: p.until)
-        self._pending = [p for p in self._pending if p.until > at]
+        ready = sorted((p for p in self._pending if p.until <= sample), key=lambda p: p.until)
+        self._pending = [p for p in self._pending if p.until > sample]
         return [self._complete(p, p.until, history, *self._stopped(p.stride)) for p in ready]
 
     def _stopped(self, stride: Stride) -> tuple[StrideFlag, ...]:
@@ -181,24 +181,26 @@ class LiveStrides:
         on = any(e.side == stride.side and e.time_s > stride.end_s for e in self._events)
         return () if on else ("last",)
 
-    def _complete(self, pending: _Pending, at: int, history: SampleHistory, *late: StrideFlag) -> LiveStride:
+    def _complete(
+        self, pending: _Pending, sample: int, history: SampleHistory, *late: StrideFlag
+    ) -> LiveStride:
         context = self._context(pending.stride.start_s)
         first = self._sample(pending.stride.start_s) - 1
-        found: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
-        if history.reaches(first, at + 1):
-            span = self._span(first, at + 1, history)
-            found = late_figures(pending.stride, context, span, self._setup.surface)
-        told, (values, reasons) = pending.told, _split(found)
-        if found["stride_length_m"] == "in_place":
+        figures: dict[str, Value] = dict.fromkeys(SPATIAL, "gap")
+        if history.reaches(first, sample + 1):
+            span = self._span(first, sample + 1, history)
+            figures = late_figures(pending.stride, context, span, self._setup.surface)
+        live_stride, (values, reasons) = pending.told, _split(figures)
+        if figures["stride_length_m"] == "in_place":
             late = (*late, "in_place")
-        flags = add_flag(replace(pending.stride, flags=told.flags), *late).flags
+        flags = add_flag(replace(pending.stride, flags=live_stride.flags), *late).flags
         return replace(
-            told,
+            live_stride,
             flags=flags,
             counted=not flags,
-            detected_s=(self._setup.first + at) / self._setup.rate_hz,
-            values={**told.values, **values},
-            reasons={k: v for k, v in told.reasons.items() if k not in found} | reasons,
+            detected_s=(self._setup.first + sample) / self._setup.rate_hz,
+            values={**live_stride.values, **values},
+            reasons={k: v for k, v in live_stride.reasons.items() if k not in figures} | reasons,
             complete=True,
         )
 
@@ -210,14 +212,14 @@ class LiveStrides:
         def moved(side: Side, since: float) -> bool:
             return any(e.side == side and e.time_s > since for e in self._events)
 
-        other, landed = OTHER[stride.side], stride.opposite_ic_s
+        opposite, landed = OTHER[stride.side], stride.opposite_ic_s
         return moved(stride.side, stride.end_s) and (
-            landed is None or other not in self._setup.feet or moved(other, landed)
+            landed is None or opposite not in self._setup.feet or moved(opposite, landed)
         )
 
     def _context(self, since: float) -> list[Stride]:
         """Strides of both feet that end later, and those that have only begun."""
-        found = []
+        strides = []
         for side in self._setup.feet:
             contacts = [e.time_s for e in self._events if e.side == side and e.kind == "ic"]
             leavings = [e.time_s for e in self._events if e.side == side and e.kind == "tc"]
@@ -231,11 +233,11 @@ class LiveStrides:
                     if e.side != side and e.kind == "ic" and start < e.time_s < end
                 ]
                 opposite = landings[0] if len(landings) == 1 else None
-                found.append(Stride(side, start, off, end, opposite_ic_s=opposite))
+                strides.append(Stride(side, start, off, end, opposite_ic_s=opposite))
             off = next((t for t in leavings if contacts and t > contacts[-1]), None)
             if off is not None:
-                found.append(Stride(side, contacts[-1], off, off))
-        return sorted(found, key=lambda s: (s.start_s, s.side))
+                strides.append(Stride(side, contacts[-1], off, off))
+        return sorted(strides, key=lambda s: (s.start_s, s.side))
 
     def _sample(self, time_s: float) -> int:
         return floor(time_s * self._setup.rate_hz + 1e-6) - self._setup.first
@@ -275,7 +277,10 @@ class LiveStrides:
         feet = None
         if x.feet:
             p, turned = history.floats("feet_p", first, past), history.floats("feet_q", first, past)
-            still, known = history.bools("feet_still", first, past), history.bools("feet_valid", first, past)
+            still, is_valid = (
+                history.bools("feet_still", first, past),
+                history.bools("feet_valid", first, past),
+            )
             patched = history.bools("feet_patched", first, past)
             feet = FootTracks(
                 t_s=t_s,
@@ -283,7 +288,7 @@ class LiveStrides:
                 p={s: p[:, i] for i, s in enumerate(x.feet)},
                 q={s: turned[:, i] for i, s in enumerate(x.feet)},
                 still={s: still[:, i] for i, s in enumerate(x.feet)},
-                valid={s: known[:, i] for i, s in enumerate(x.feet)},
+                valid={s: is_valid[:, i] for i, s in enumerate(x.feet)},
                 patched={s: patched[:, i] for i, s in enumerate(x.feet)},
                 linked=x.linked,
                 source=x.source,
@@ -292,7 +297,7 @@ class LiveStrides:
         return StrideSpan(t_s, take.q, take.valid, angles, feet)
 
 
-def _split(found: Mapping[str, Value]) -> tuple[dict[str, float | None], dict[str, str]]:
+def _split(figures: Mapping[str, Value]) -> tuple[dict[str, float | None], dict[str, str]]:
     """Values, None for those with a reason; and the reasons."""
-    values = {name: v if isinstance(v, float) else None for name, v in found.items()}
-    return values, {name: v for name, v in found.items() if isinstance(v, str)}
+    values = {name: v if isinstance(v, float) else None for name, v in figures.items()}
+    return values, {name: v for name, v in figures.items() if isinstance(v, str)}
