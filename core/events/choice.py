@@ -18,9 +18,9 @@ from sagittal.core.frames import Floats
 SAME_S: Final = 0.1
 """Contacts so close are one. Both finders differ by 0.03 s on ipol_walks (standard deviation)."""
 SEEN_SHARE: Final = 0.5
-"""The pitch is used if at least this share of the contacts by way has one by pitch: 0.85 and more for every foot
-of ipol_walks, stroke_treadmill and virtual people it reads correctly, 0.67 for one foot of neura_walk (contacts by
-way up to 0.13 s late), at most 0.33 for virtual feet that it misreads."""
+"""The pitch is used if at least this share of the contacts by way has one by pitch: 0.85 and more for all
+feet of ipol_walks and stroke_treadmill and of virtual people it reads correctly, 0.67 for one foot of
+neura_walk (contacts by way up to 0.13 s late), at most 0.33 for virtual feet that it misreads."""
 COUNT_SHARE: Final = 0.8
 """The way is not believed where contacts by pitch outside its swings make it fewer than this share of all:
 who never rests between two steps hides them from it. One inside a swing is none: the foot is on its way."""
