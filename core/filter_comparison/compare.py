@@ -151,7 +151,7 @@ def _check_any_ran(runs: Mapping[str, FilterRun]) -> None:
         first_message = next(run.told[0].message for run in runs.values())
         raise EstimationError(
             "no_filter_ran",
-            Message("No filter gave a result. The first reported: {told}", told=first_message),
+            Message("No filter produced a result. First error: {told}", told=first_message),
         )
 
 

@@ -173,8 +173,8 @@ def assess(
         notices.append(
             Notice(
                 "no_rest",
-                "The sensors are never all at rest for 1 s, so there is no standing posture as a reference. "
-                "Ask the person to stand still for 3 to 5 s at the start.",
+                "The sensors were never all still for 1 s, so there is no reference standing posture. Ask "
+                "the person to stand still for 3 to 5 s at the start.",
                 severity="info",
             )
         )

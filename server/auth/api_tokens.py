@@ -87,7 +87,7 @@ def issue(
             409,
             "too_many_tokens",
             Message(
-                "An account has at most {MOST_TOKENS} tokens. Revoke one that is not used.",
+                "An account can have at most {MOST_TOKENS} tokens. Revoke one you no longer use.",
                 MOST_TOKENS=MOST_TOKENS,
             ),
         )

@@ -279,7 +279,7 @@ def _checked(values: Mapping[str, object]) -> dict[str, Any]:
             raise ServiceError(
                 "bad_value",
                 Message(
-                    "{name} is one of {words}, or null where not stated.", name=name, words=", ".join(words)
+                    "{name} must be one of {words}, or null if not stated.", name=name, words=", ".join(words)
                 ),
             )
     if not isinstance(checked.get("feedback", False), bool):

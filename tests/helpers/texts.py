@@ -133,7 +133,7 @@ PHRASES: Final = (
     "left {left}, right {right}",
     "{side} not measured: {why}",
     "{side} not reported: {why}",
-    "{side} not measured by two sensors",
+    "{side} not measured by a sensor on each segment",
     "{side} not measured",
     "{name} left",
     "{name} right",

@@ -31,7 +31,7 @@ FIRST: Final = "step_length_m"
 ON_CARD: Final = ("Target", "Display name", "Schedule", "Level", "Ends")
 
 MODES: Final = (
-    ("bar", "Bar", "height shows the value, target marked"),
+    ("bar", "Bar", "bar height shows the value; the target is marked"),
     ("zone", "Zone", "green, yellow or red, with the direction"),
     ("tone", "Tone", "outside the zone, louder and higher with larger error"),
     ("tick", "Tick", "at every contact of the foot"),

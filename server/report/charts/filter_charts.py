@@ -97,5 +97,7 @@ def draw_agreement(
     plot.add_text("0", 0, "Filter more ↑", "words halo", "start", dx=5, dy=11)
     return plot.draw(
         "chart cycle x-unit",
-        Message("{title}: filter minus reference over their mean; values in the table", title=title),
+        Message(
+            "{title}: difference (filter − reference) against their mean; values in the table", title=title
+        ),
     )

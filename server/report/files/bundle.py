@@ -37,7 +37,10 @@ EDIT_WORDS: Final[Mapping[EditKind, tuple[str, str]]] = {
     "add_event": ("event added", "events added"),
     "delete_event": ("event deleted", "events deleted"),
     "exclude_stride": ("stride excluded", "strides excluded"),
-    "include_stride": ("stride included despite a rule", "strides included despite a rule"),
+    "include_stride": (
+        "stride included despite an exclusion rule",
+        "strides included despite an exclusion rule",
+    ),
 }
 """Kind of edit → words for singular and plural."""
 

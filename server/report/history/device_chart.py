@@ -53,7 +53,7 @@ def draw_device(
     plot.add_dot(x, v, "pl-b", 5.0)
     x_text, text = f"{format_coordinate(x / 10)}%", format_number(v, digits)
     plot.add_text(x_text, plot.px(v), text, "strong halo", "middle", dy=-11)
-    return plot.draw("chart trend-plot", Message("{title} over the trials; values in the table", title=title))
+    return plot.draw("chart trend-plot", Message("{title} by trial; values in the table", title=title))
 
 
 def _name_days(plot: PlotArea, days: Sequence[dt.date]) -> None:

@@ -97,7 +97,7 @@ def trend_svg(
     title = f"{trend.term.label}{'' if line.side is None else f', {line.side}'}"
     return plot.draw(
         "chart trend-plot small" if small else "chart trend-plot",
-        Message("{title} over the visits; values in the table", title=title),
+        Message("{title} by visit; values in the table", title=title),
     )
 
 

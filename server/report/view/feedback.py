@@ -41,7 +41,7 @@ KINDS: Final[tuple[tuple[Kind, str, bool], ...]] = (
     ("probe", "of these, in probe blocks", True),
     ("faded", "of these, without feedback by schedule", True),
     ("off", "of these, while off, paused or without current data", True),
-    ("stopped", "of these, after the end", True),
+    ("stopped", "of these, after feedback had ended", True),
 )
 """Kind of stride, its label, and whether it is part of the row above."""
 

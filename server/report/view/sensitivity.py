@@ -49,15 +49,15 @@ GROUPS: Final[tuple[tuple[str, Mapping[str, str]], ...]] = (
     (
         "Sensor alignment",
         {
-            "Roll-tib": "Shin, about the bone",
+            "Roll-tib": "Shin, rotation about the bone",
             "Pitch-tib": "Shin, to the side",
             "Yaw-tib": "Shin, forward or back",
-            "Roll-thi": "Thigh, about the bone",
+            "Roll-thi": "Thigh, rotation about the bone",
             "Pitch-thi": "Thigh, to the side",
             "Yaw-thi": "Thigh, forward or back",
             "Roll-bac": "Back, forward or back",
             "Pitch-bac": "Back, to the side",
-            "Yaw-bac": "Back, about the spine",
+            "Yaw-bac": "Back, rotation about the spine",
         },
     ),
     (

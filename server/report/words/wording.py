@@ -154,7 +154,7 @@ REASONS: Final[Mapping[str, str]] = {
     "no_level": "not measured: only the shape over the stride is known, not its level relative to the "
     "walking direction",
     "variables_missing": "not measured: some of its variables are missing",
-    "estimated": "not measured by two sensors",
+    "estimated": "not measured by a sensor on each segment",
     "standing_width_unknown": "not measured: enter the distance between the ankles while standing",
     "feet_not_linked": "not measured: requires sensors on both legs and the pelvis to locate the feet",
     "no_shoe_geometry": "not measured: requires the shape of the shoe",
