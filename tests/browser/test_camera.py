@@ -75,7 +75,7 @@ def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
     assert abs(video["offset_s"]) < 1.5  # the camera starts as the samples do
     page = opened("/audit")
     page.wait_for_load_state()
-    expect(page.get_by_text("began to film a take").first).to_be_visible()
+    expect(page.get_by_text("started filming a trial").first).to_be_visible()
     wait_for_analysis(clinic)
     page = opened(f"/sessions/{clinic.session}")
     page.wait_for_function("() => Number(document.querySelector('take-video')?.dataset.length) > 20")
@@ -138,7 +138,7 @@ def test_a_refused_camera_is_said_and_disturbs_nothing(
         pair(page, clinic.code)
         page.get_by_label(re.compile("the person agreed to be filmed")).click()
         card = page.locator("[data-camera]")
-        expect(card.get_by_text("The camera was not allowed")).to_be_visible()
+        expect(card.get_by_text("Camera access was denied")).to_be_visible()
         expect(card.get_by_role("checkbox")).not_to_be_checked()
         choose(page, walk_files())
         place(page, SEGMENTS)

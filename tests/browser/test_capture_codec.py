@@ -288,7 +288,7 @@ def test_a_plain_table_of_ours_is_read(blank: Page) -> None:
     ("name", "content", "says"),
     [
         ("notes.txt", b"no recording at all\n", "neither Xsens MT Manager text"),
-        ("a.txt", b"PacketCounter,Acc_X,Acc_Y,Acc_Z\n1,0,0,9.8\n", "no rate of turn"),
+        ("a.txt", b"PacketCounter,Acc_X,Acc_Y,Acc_Z\n1,0,0,9.8\n", "no angular rate"),
         ("b.txt", b"PacketCounter,FreeAcc_X,Gyr_X,Gyr_Y,Gyr_Z\n1,0,0,0,0\n", "acceleration with gravity"),
         ("c.csv", b"t_s,A.acc_x\n0,1\n1,2\n", "A.acc_y"),
         ("d.txt", b"PacketCounter,Acc_X,Acc_Y,Acc_Z,Gyr_X,Gyr_Y,Gyr_Z\n1,0,0,9,0,0,0\n", "not say its rate"),
@@ -380,10 +380,10 @@ def test_the_self_test_finds_rates_in_radians_and_a_turned_sign(blank: Page) -> 
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
-        (lambda row: [*row[:4], 0.0, 0.0, 0.0], "do not fit gravity"),
-        (lambda row: [*row[:4], *(3 * r for r in row[4:])], "do not fit gravity"),
-        (lambda row: [row[0], *(0.3 * a for a in row[1:4]), *row[4:]], "no gravity in it"),
-        (lambda row: [*row[:4], float("nan"), 0.0, 0.0], "no rate of turn"),
+        (lambda row: [*row[:4], 0.0, 0.0, 0.0], "do not match gravity"),
+        (lambda row: [*row[:4], *(3 * r for r in row[4:])], "do not match gravity"),
+        (lambda row: [row[0], *(0.3 * a for a in row[1:4]), *row[4:]], "excludes gravity"),
+        (lambda row: [*row[:4], float("nan"), 0.0, 0.0], "no angular rate"),
     ],
 )
 def test_the_self_test_refuses_what_gravity_contradicts(blank: Page, spoil: Any, says: str) -> None:

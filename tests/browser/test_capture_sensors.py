@@ -63,7 +63,7 @@ def test_dots_stream_with_their_own_clocks_and_go_on_after_losing_the_radio(
         start(page)
         until(page, "page.outbox.acked > 10")
         page.evaluate("() => radio.lose(0)")
-        expect(page.get_by_role("alert")).to_contain_text("sends nothing", timeout=8000)
+        expect(page.get_by_role("alert")).to_contain_text("is not sending", timeout=8000)
         page.evaluate("() => radio.find(0)")
         expect(page.get_by_role("alert")).to_be_hidden(timeout=12_000)
         page.locator("[data-go]").click()
@@ -204,7 +204,7 @@ def test_a_failed_self_test_is_said_and_can_be_repeated(
         pair(page, clinic.code)
         page.get_by_role("button", name="This device itself").click()
         page.evaluate(MOVE, broken)
-        expect(page.locator("[data-axes-more]")).to_contain_text("do not fit gravity")
+        expect(page.locator("[data-axes-more]")).to_contain_text("do not match gravity")
         page.get_by_role("button", name="Check again").click()
         expect(page.locator("[data-axes-say]")).to_contain_text("1 of 4")
 

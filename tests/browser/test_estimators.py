@@ -62,9 +62,9 @@ def test_another_estimator_runs_and_its_angles_are_marked(opened: Opener, walk: 
 
 def test_the_ankles_distance_gives_step_width(opened: Opener, walk: str) -> None:
     page = opened(f"/sessions/{walk}", stays=True)
-    expect(find_row(page, "Step width")).to_contain_text("enter how far apart the ankles are")
+    expect(find_row(page, "Step width")).to_contain_text("enter the distance between the ankles")
     page.goto(f"/sessions/{walk}/upload")
-    ankles = page.get_by_label("Ankles apart while standing")
+    ankles = page.get_by_label("Distance between the ankles while standing")
     ankles.fill("3")
     page.get_by_role("button", name="Analyse").click()
     assert page.locator("main input:invalid").count() == 1, "three metres must not pass"
@@ -101,22 +101,22 @@ def test_goniometer_and_shoe_go_into_the_manifest_and_leave_it(
     opened: Opener, walk: str, running: RunningServer
 ) -> None:
     page = opened(f"/sessions/{walk}/upload", stays=True)
-    page.get_by_text("Angles of standing by goniometer").click()
+    page.get_by_text("Standing angles by goniometer").click()
     page.get_by_label("Knee flexion, left").fill("8")
     page.get_by_label("Knee flexion, right").fill("-2")
-    page.get_by_text("Sole of the shoe by tape").click()
+    page.get_by_text("Shoe sole by tape").click()
     page.get_by_label("To the rear end").fill("0.16")
     page.get_by_label("To the tip").fill("0.12")
     page.get_by_role("button", name="Analyse").click()
     page.wait_for_url(re.compile(rf"/sessions/{walk}$"), wait_until="commit")
     _wait_for_results(page)
-    clearance = find_row(page, "Toe clearance")
+    clearance = find_row(page, "Minimum toe clearance")
     expect(clearance.locator("td.n .num").first).to_have_text(re.compile(r"^\s*−?0\.\d+(\s*± [\d.]+)?\s*$"))
     with running.client() as client:
         body = client.get(f"/api/v1/sessions/{walk}/recording").json()["manifest"]["subject"]
     assert body["standing_angles_deg"] == {"knee_flexion_l": 8, "knee_flexion_r": -2}
     page.goto(f"/sessions/{walk}/upload")
-    page.get_by_text("Sole of the shoe by tape").click()
+    page.get_by_text("Shoe sole by tape").click()
     page.get_by_label("To the rear end").fill("")
     page.get_by_label("To the tip").fill("")
     page.get_by_role("button", name="Analyse").click()

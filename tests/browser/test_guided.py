@@ -85,14 +85,14 @@ def test_a_guided_up_and_go_is_timed_corrected_kept_and_analysed(
         start = float(test.get_by_label("Start, seconds").input_value())
         test.get_by_label("Start, seconds").fill(f"{start - 0.5:.2f}")
         test.get_by_role("button", name="Measure again").click()
-        expect(test.locator("[data-total-note]")).to_contain_text("set by hand")
+        expect(test.locator("[data-total-note]")).to_contain_text("set manually")
         assert float(test.locator("[data-total]").inner_text()) == pytest.approx(true_s + 0.5, abs=0.15)
 
         # kept: the recording is measured with what is shown
         test.get_by_role("button", name="Keep and finish").click()
         page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), timeout=90_000)
         card = page.locator("section", has=page.locator("#h-test"))
-        expect(card).to_contain_text("confirmed or set by hand")
+        expect(card).to_contain_text("confirmed or set manually")
         total = float(card.locator(".kpi .v").first.evaluate("e => e.firstChild.textContent"))
         assert total == pytest.approx(true_s + 0.5, abs=0.15)
 

@@ -111,7 +111,7 @@ def test_a_walk_goes_from_the_tablet_to_both_screens_and_becomes_a_session(
         # calibration: stand, then walk
         expect(page.locator("live-page")).to_have_attribute("data-view", "calibrate", timeout=15_000)
         expect(page.locator("live-calibration [data-say]")).to_contain_text(
-            "walk straight on", timeout=10_000
+            "walk straight ahead", timeout=10_000
         )
         expect(page.locator("live-sensors [data-all]")).to_have_text("7 of 7 good")
         expect(screen.locator("[data-pause-title]")).to_have_text("Walk on")

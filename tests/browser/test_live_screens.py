@@ -187,7 +187,7 @@ def test_after_stop_the_page_says_that_it_is_saving_not_that_data_are_missing(
     page.get_by_role("button", name="STOP").click()
     expect(cover).to_contain_text("Stopping… saving")
     expect(page.locator("[data-rec]")).to_contain_text("Stopping… saving")
-    expect(cover).to_contain_text("The tablet sends what is left")
+    expect(cover).to_contain_text("The tablet is sending the remaining data")
     this.say(feed.frame(100.9, stale=True))
     expect(cover).not_to_contain_text("Paused")
     expect(page.locator("[data-spoken]")).to_contain_text("Stopping", timeout=30_000)
@@ -257,7 +257,7 @@ def test_stop_stays_within_reach_while_a_mark_is_written(told: Opener, trained: 
     expect(page.locator("#mark-dialog")).to_be_hidden()
 
 
-@pytest.mark.parametrize(("stage", "words"), [("stand", "stand still"), ("walk", "walk straight on")])
+@pytest.mark.parametrize(("stage", "words"), [("stand", "stand still"), ("walk", "walk straight ahead")])
 def test_calibration_says_what_is_waited_for(
     stage: Any, words: str, told: Opener, trained: tuple[str, str, str]
 ) -> None:
@@ -303,7 +303,7 @@ def test_a_code_is_shown_in_two_groups_and_a_second_page_asks_for_a_new_one(
     first = page.locator("[data-code]").text_content()
     other_other_page = context.new_page()
     other_other_page.goto(f"/sessions/{session}/live")
-    expect(other_other_page.locator("[data-code-left]")).to_contain_text("Ask for a new one")
+    expect(other_other_page.locator("[data-code-left]")).to_contain_text("Request a new one")
     other_other_page.get_by_role("button", name="New code").click()
     expect(other_other_page.locator("[data-code]")).to_have_text(re.compile(r"^[2-9A-Z]{3} [2-9A-Z]{3}$"))
     assert other_other_page.locator("[data-code]").text_content() != first
@@ -531,7 +531,7 @@ def test_a_test_whose_estimate_has_ended_shows_no_running_clock_and_nothing_to_b
     expect(test.get_by_role("button", name="Start over")).to_be_visible()
     this.say(feed.state(estimate="failed"))
     expect(test.locator("[data-phase]").first).to_have_text("Live view stopped")
-    expect(test.locator("[data-say]")).to_contain_text("measured afterwards")
+    expect(test.locator("[data-say]")).to_contain_text("analysed afterwards")
     expect(test.get_by_role("button", name="Start over")).to_be_hidden()
     expect(test.locator("[data-clock]")).to_have_css("text-decoration-line", "line-through")
     visible_text = test.locator("[data-clock]").inner_text()

@@ -46,7 +46,7 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     page.get_by_label("Parameter", exact=True).select_option("stride_length_m")
     expect(page.get_by_label("Left affected")).to_be_disabled()
     expect(page.get_by_role("radio", name="Both", exact=True)).to_be_checked()
-    expect(page.get_by_text("Both sides of a walk share it")).to_be_visible()
+    expect(page.get_by_text("It is common to both sides")).to_be_visible()
     page.get_by_label("Parameter", exact=True).select_option("step_length_m")
     sides = {"left": page.get_by_label("Left affected"), "right": page.get_by_label("Right", exact=True)}
     better_side = "right" if worse == "left" else "left"
@@ -102,7 +102,7 @@ def test_without_a_walk_only_an_entered_target_can_be_chosen(opened: Opener, fil
     expect(page.get_by_role("radio", name="Entered")).to_be_checked()
     for source in ("norm", "own_better_side", "own_baseline"):
         expect(page.locator(f"[data-source={source}]").get_by_role("radio")).to_be_disabled()
-    expect(page.locator("[data-source=norm] [data-words]")).to_contain_text("No walk of this person")
+    expect(page.locator("[data-source=norm] [data-words]")).to_contain_text("No walk without feedback")
 
 
 def test_the_form_is_filled_with_the_keyboard_alone(opened: Opener, walker: str) -> None:

@@ -112,7 +112,7 @@ def test_the_first_picture_gives_way_to_the_figure_without_a_jump(
     page.goto(f"/sessions/{filled.done}", wait_until="domcontentloaded")
     view = page.locator("gait-view")
     drawn = shot(view)
-    expect(view.get_by_role("img", name="Where the replay begins")).to_be_visible()
+    expect(view.get_by_role("img", name="Start of the replay")).to_be_visible()
     expect(view.locator("[data-say]")).to_have_text("Opening the 3D view…")
     while not held:
         page.wait_for_timeout(20)

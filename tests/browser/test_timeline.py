@@ -210,7 +210,7 @@ def test_keys_alone_delete_an_event_and_bring_it_back(
     assert len(review(running, walked)["events"]) == count
     timeline.keyboard.press("x")
     dialog = timeline.locator("dialog[open]")
-    expect(dialog).to_contain_text("no longer counts")
+    expect(dialog).to_contain_text("will be excluded")
     dialog.get_by_role("button", name="Cancel").click()
 
 
@@ -287,7 +287,7 @@ def test_a_redo_is_refused_when_somebody_else_changed_something(
     with running.client() as client:
         client.post(f"/api/v1/sessions/{walked}/edits", json=body).raise_for_status()
     timeline.keyboard.press("Control+Shift+Z")
-    expect(timeline.locator("[data-problem]")).to_contain_text("Somebody else has changed")
+    expect(timeline.locator("[data-problem]")).to_contain_text("Another user has changed")
     expect(timeline.locator("[data-edits]")).to_contain_text("by a colleague")
     expect(timeline.locator("[data-redo]")).to_be_disabled()
     assert len(review(running, walked)["edits"]) == 1
@@ -473,7 +473,7 @@ def test_what_somebody_else_changed_meanwhile_is_said_and_shown(
         moment = (stride["start_s"] + stride["end_s"]) / 2
         client.post(f"/api/v1/sessions/{walked}/edits", json={**body, "time_s": moment}).raise_for_status()
     drag(timeline, handle(timeline, "tc"), 12)
-    expect(timeline.locator("[data-problem]")).to_contain_text("Somebody else has changed")
+    expect(timeline.locator("[data-problem]")).to_contain_text("Another user has changed")
     expect(timeline.locator("[data-edits]")).to_contain_text("by a colleague")
     assert len(review(running, walked)["edits"]) == 1
 

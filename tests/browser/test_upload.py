@@ -137,7 +137,7 @@ def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(
     for foot in sides:
         expect(page.locator(f"tr[data-device={foot}] select")).to_have_value(foot)
     # what the file's manifest measured is shown, so that a person can correct it
-    expect(page.get_by_label("Ankles apart while standing")).to_have_value("0.21")
+    expect(page.get_by_label("Distance between the ankles while standing")).to_have_value("0.21")
     page.locator("[data-analyse]").click()
     page.wait_for_url(re.compile(r"/sessions/[0-9a-f]{32}$"), wait_until="commit")
     expect(page.locator(".params").first).to_be_visible(timeout=180_000)
@@ -272,7 +272,7 @@ def test_a_file_that_breaks_off_can_be_tried_again(
     page.route("**/files/two.txt", lambda route: route.abort(), times=1)
     page.locator("[data-files]").set_input_files([str(tmp_path / name) for name in files])
     broken = page.locator("[data-sending] li.bad")
-    expect(broken).to_contain_text("The connection broke")
+    expect(broken).to_contain_text("The connection was lost")
     expect(page.get_by_role("button", name="Continue without them")).to_be_visible()
     page.get_by_role("button", name="Try two.txt again").click()
     # both are there: the server looks into them and the page shows what it thinks of them
@@ -306,16 +306,16 @@ def test_a_large_file_goes_on_after_a_lost_connection_and_after_a_reload(
     page.route("**/uploads/*", watch)
     page.locator("[data-files]").set_input_files(str(large))
     say = page.locator("[data-sending] [data-say]")
-    expect(say).to_contain_text("Goes on by itself when it is back")
+    expect(say).to_contain_text("The upload resumes automatically")
     # the page finds how far the server is, and goes on there without anybody
     with page.expect_request(lambda r: r.headers.get("upload-offset") == "12000000", timeout=30_000):
         network.mend()
-    expect(say).to_contain_text("Goes on by itself when it is back", timeout=30_000)
+    expect(say).to_contain_text("The upload resumes automatically", timeout=30_000)
     page.on("dialog", lambda dialog: dialog.accept())
     page.goto("about:blank")
     network.mend()
     page.goto(f"/sessions/{session}/upload")
-    expect(page.locator("[data-part]")).to_contain_text("Choose the file again to go on")
+    expect(page.locator("[data-part]")).to_contain_text("Choose the file again to continue")
     parts.clear()
     page.locator("[data-files]").set_input_files(str(large))
     expect(page.locator("details .files")).to_contain_text("large.txt", timeout=30_000)
@@ -342,7 +342,7 @@ def test_two_columns_cannot_both_be_the_time(opened: Opener, running: RunningSer
     page = opened(f"/sessions/{session}/upload", stays=True)
     page.locator("[data-files]").set_input_files(file)
     columns = page.locator("column-map")
-    expect(columns.locator("[data-check=bad]")).to_contain_text("which column is the time", timeout=60_000)
+    expect(columns.locator("[data-check=bad]")).to_contain_text("select the time column", timeout=60_000)
     columns.get_by_label("Meaning of column X [s]#1").select_option("time")
     expect(columns.locator("[data-check=bad]")).to_have_count(0, timeout=20_000)
     columns.get_by_label("Meaning of column X [s]#3").select_option("time")

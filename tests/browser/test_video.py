@@ -37,7 +37,7 @@ def test_a_film_is_aligned_by_one_contact_and_follows_the_clock(
     film = base64.b64decode(page.evaluate(FILM))
     add = page.get_by_role("button", name="Add a video")
     expect(add).to_be_disabled()
-    page.get_by_label("The person agreed to be filmed").check()
+    page.get_by_label("The person has agreed to be filmed").check()
     expect(add).to_be_enabled()
     payload: FilePayload = {"name": "walk.webm", "mimeType": "video/webm", "buffer": film}
     page.locator("video-upload [data-file]").set_input_files(payload)
@@ -65,4 +65,4 @@ def test_a_film_is_aligned_by_one_contact_and_follows_the_clock(
     page.goto(f"/sessions/{filled.done}/data")
     page.wait_for_load_state()
     page.locator("video-upload").get_by_role("button", name="Remove").click()
-    expect(page.get_by_text("None. It plays beside the figure")).to_be_visible()
+    expect(page.get_by_text("None. A video plays next to the avatar")).to_be_visible()

@@ -45,7 +45,7 @@ def test_a_stop_of_a_virtual_person_is_no_standing(name: str) -> None:
     calibration = calibrate(within_walk(name)).calibration
     assert calibration.posture == "walking"
     (notices,) = (n.message for n in calibration.notices if n.code == "from_walking")
-    assert "paused in mid-stride" in notices
+    assert "paused mid-stride" in notices
 
 
 @pytest.mark.slow

@@ -115,7 +115,7 @@ async def _use_while_away(
     bucket.server.stop()
     page = await client.get(f"/sessions/{session}", headers=HTML)
     assert (page.status_code, page.headers["retry-after"]) == (503, "5")
-    assert "stored files cannot be reached now" in page.text
+    assert "file storage is unavailable" in page.text
     assert bucket.name not in page.text
     for still in ("/patients", f"/patients/{patient}", f"/sessions/{session}/live"):
         assert (await client.get(still, headers=HTML)).status_code == 200, still

@@ -137,7 +137,7 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
         place = (clinic.db, clinic.app.state.blobs, clinic.settings, clinic.app.state.queue, None)
         live_logs.adopt(*place, STRAY, session)
         path = put_stray(tmp_path)
-        with pytest.raises(Conflict, match="belongs to a session already"):
+        with pytest.raises(Conflict, match="already belongs to a visit"):
             live_logs.adopt(*place, STRAY, session)
         assert path.read_bytes() == WHOLE
 

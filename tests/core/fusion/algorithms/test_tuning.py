@@ -202,4 +202,4 @@ def test_gains_that_only_fit_their_own_trials_are_not_recommended() -> None:
     result = tune(TrialSplit((noisy,), (drifting,)))
     assert isinstance(result, TuningResult)
     assert not result.improved
-    assert "Keep the gains it began with." in result.verdict
+    assert "Keep the initial gains." in result.verdict

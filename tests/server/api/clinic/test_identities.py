@@ -162,13 +162,13 @@ async def test_the_export_of_one_patient_has_it_and_nothing_else_has(
         for path in (f"{API}/patients/{pid}/identity", f"/patients/{pid}/identity"):
             missing = await client.get(path, headers={"accept": "text/html"})
             assert missing.status_code == 503
-            assert "not in its place" in missing.text
+            assert "patient names is missing" in missing.text
             assert str(clinic.settings.data_dir) not in missing.text
         with zipfile.ZipFile(
             io.BytesIO((await client.get(f"{API}/patients/{pid}/export")).content)
         ) as archive:
             assert "patient_identity" not in json.loads(archive.read("patient.json"))["rows"]
-            assert b"not in its place" in archive.read("missing.json")
+            assert b"patient names is missing" in archive.read("missing.json")
     assert CANARY not in caplog.text
     if clinic.settings.database_url:
         return  # its files are the server's; the rows are looked at in services/test_identities.py

@@ -88,7 +88,7 @@ async def test_a_take_is_compared_with_the_day_before_and_not_with_the_take_befo
     assert re.findall(r"0\.\d\d ± 0\.02|1\.00 ± 0\.02|<b>0\.95</b>", row) == [
         "0.90 ± 0.02", "1.00 ± 0.02", "<b>0.95</b>",
     ]  # fmt: skip
-    assert "takes of this visit" not in await text_of(clinic, f"/sessions/{first}")
+    assert "trials in this visit" not in await text_of(clinic, f"/sessions/{first}")
     assert f"/sessions/{last}/compare/{first}" in html
     assert "Changed since 2 Mar 2026" in html
 
