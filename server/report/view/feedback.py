@@ -183,8 +183,12 @@ def _notes(split: FeedbackSplit, term: Term) -> tuple[str, ...]:
                 sd=format_quantity(live.sd, term, term.digits + 1),
             )
         )
-    for n, outcome in ((split.unmatched, "no stride"), (split.left_out, "an excluded stride")):
-        if n:
-            cues = plural(n, "1 cue, excluded, has", Message("{value} cues, excluded, have", value=n))
-            notes.append(Message("{cues} {outcome} in the analysis.", cues=cues, outcome=outcome))
+    if n := split.unmatched:
+        one = "1 cue was excluded because it has no stride in the analysis."
+        several = "{value} cues were excluded because they have no stride in the analysis."
+        notes.append(plural(n, one, Message(several, value=n)))
+    if n := split.left_out:
+        one = "1 cue was excluded because its stride is excluded from the analysis."
+        several = "{value} cues were excluded because their strides are excluded from the analysis."
+        notes.append(plural(n, one, Message(several, value=n)))
     return tuple(notes)

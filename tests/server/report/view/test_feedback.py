@@ -63,7 +63,7 @@ def test_notes_say_how_far_the_live_values_were_off_and_what_was_left_out() -> N
     assert live == f"Live feedback values differed from the analysis by 0.020 ± 0.000{NBSP}m."
     few = split([AnalysedStride("left", 2.0, 0.6, False)], [cue(1), cue(2), cue(3)])
     assert view(few).notes[2:] == (
-        "2 cues, excluded, have no stride in the analysis.",
+        "2 cues were excluded because they have no stride in the analysis.",
         "1 cue was excluded because its stride is excluded from the analysis.",
     )
 
