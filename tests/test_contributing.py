@@ -96,7 +96,7 @@ async def test_a_parameter_of_the_catalogue_is_in_report_api_and_csv(
             )
     row = next(r for r in report["parameters"] if r["name"] == added.name)
     assert (row["title"], row["unit"], row["group"]) == (
-        f"{added.label}, from standing",
+        f"{added.label}, relative to standing",
         "°",
         added.group,
     )

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import median_filter, minimum_filter1d, uniform_filter1d
 
 from sagittal.core.formats.clocks.step import Ints
 from sagittal.core.frames import Bools, Floats
@@ -97,7 +96,9 @@ def spread_rows(stamps: Floats, widths: Ints, wrong: Bools, step: float, usual: 
 
 
 def _find_floor(delay: Floats, ahead: int) -> Floats:
-    """Smallest delay among so many runs from each one on."""
+    """Running minimum of the delay over the next `ahead` runs, for each run."""
+    from scipy.ndimage import median_filter, minimum_filter1d  # not in the web server
+
     size = min(ahead, len(delay))
     delay = median_filter(delay, min(_NEIGHBOURS, len(delay)), mode="nearest")
     return np.asarray(minimum_filter1d(delay, size, origin=-(size // 2), mode="nearest"))
@@ -122,6 +123,8 @@ def _find_extra(stamps: Floats, widths: Ints, first: Ints, knots: Ints, step: fl
 
 def _smooth(x: Floats, y: Floats, step: float, usual: int) -> tuple[float, Floats]:
     """The step measured again, and stamps of packets without their jitter."""
+    from scipy.ndimage import uniform_filter1d  # not in the web server
+
     if len(x) < 4:
         return step, y
     scaled = np.polyfit(x - x[0], y - y[0], 1)

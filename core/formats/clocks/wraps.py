@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from scipy.ndimage import median_filter
 
 from sagittal.core.frames import Floats
 
@@ -53,6 +52,8 @@ def find_wrap(x: Floats, step: float, usual: int, tick: float, *, seconds: bool)
     x : (n,) stamps. step : of one row. usual : rows that share a stamp. tick : length of the smallest unit
         of the column as written, in the unit of x, 0 = unknown. seconds : x is in s, else it counts samples.
     """
+    from scipy.ndimage import median_filter  # not in the web server
+
     if not (np.diff(x) < 0).any():
         return None
     x = np.asarray(median_filter(x, _OUTLIERS, mode="nearest"))

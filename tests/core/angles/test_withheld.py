@@ -158,7 +158,7 @@ def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_
     assert {(p.mean, p.reason) for p in distances} == {(None, "estimator_bad")}
     messages = [n.message for n in exchange.notices if n.code == "distances_withheld"]
     assert len(messages) == 1
-    assert messages[0].startswith("Distances of both feet are withheld: the path does not fit the sensors.")
+    assert messages[0].startswith("Distances of both feet are not reported: the path does not fit the sensors.")
     files = analysis_files(exchange)
     bundle = load_bundle(files)
     second_gait = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
@@ -179,7 +179,7 @@ def test_distances_of_a_foot_that_refuses_its_own_rests_are_withheld_of_it_alone
     assert result.feet is not None
     assert result.feet.withheld == {"left": "path_bad"}
     (notices,) = (n.message for n in result.poses.notices if n.code == "distances_withheld")
-    assert "left foot are withheld: the path does not fit its rests on the floor" in notices
+    assert "left foot are not reported: the path does not fit its rests on the floor" in notices
     assert "path" in REASONS["path_bad"]
     assert "sensors" not in REASONS["path_bad"]
     assert results.tracks is not None

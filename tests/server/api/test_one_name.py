@@ -76,7 +76,7 @@ async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> Non
         names = _rows(html)
         assert "Hip flexion at contact, anatomical" in names
         assert max(Counter(names).values()) == 1, Counter(names).most_common(3)
-        assert "Hip flexion at contact, from standing" not in names
+        assert "Hip flexion at contact, relative to standing" not in names
     sheet = paper.partition("<h1>Kinematics</h1>")[2]  # the first sheet has three of these curves too
     for html in (kinematics, sheet):
         titles = _charts(html)
@@ -96,4 +96,4 @@ async def test_no_name_occurs_twice_with_different_values(clinic: Clinic) -> Non
     assert bare
     assert all(c["norm"] is None for c in bare)
     assert 'class="band"' not in "".join(re.findall(r'<div class="chart cycle.*?</div>', compared, re.DOTALL))
-    assert "Hip flexion at contact, from standing" in compared
+    assert "Hip flexion at contact, relative to standing" in compared

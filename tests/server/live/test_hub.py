@@ -178,7 +178,7 @@ async def test_what_was_told_live_is_what_the_recording_says_commands_and_a_kill
         initial_count = len(page.of("cue"))
         for pid in hub_of(clinic).pool.pids:
             os.kill(pid, signal.SIGKILL)
-        await page.until(lambda p: any("starts again" in n["text"] for n in p.of("notice")))
+        await page.until(lambda p: any("restarts" in n["text"] for n in p.of("notice")))
         count = len(page.messages)
         gates[1].set()
         await page.until(lambda p: any(m["type"] == "frame" for m in p.messages[count:]))

@@ -126,7 +126,7 @@ async def test_what_cannot_be_adopted_is_refused_with_a_sentence_and_left(
             ([*data, "--session", session], "Give both"),
             ([*data, "b" * 32, "--session", session], "no live log"),
             ([*data, "../sagittal", "--session", session], "no live log"),
-            ([*data, STRAY, "--session", session], "holds no sample"),
+            ([*data, STRAY, "--session", session], "has no readable sample"),
         ):
             assert main(words) != 0
             assert reason in capsys.readouterr().err

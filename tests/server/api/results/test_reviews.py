@@ -137,7 +137,7 @@ async def test_report_tables_and_pages_follow_the_edits(clinic: Clinic, path: st
                 assert "nan" not in answer.text.lower()
                 tables[name] = list(csv.DictReader(io.StringIO(answer.text)))
             page = (await client.get(path.removeprefix(API), headers={"Accept": "text/html"})).text
-            words = re.search(r"(\d+) of \d+ used", page)
+            words = re.search(r"(\d+) of \d+ included", page)
             assert words is not None
             return {"report": report, "words": words[1], **tables}
 
@@ -149,7 +149,7 @@ async def test_report_tables_and_pages_follow_the_edits(clinic: Clinic, path: st
     assert int(final["words"]) == int(initial["words"]) - 1
     assert sum(s["used"] for s in final["report"]["strides"]) == int(final["words"])
     (message,) = [w["message"] for w in final["report"]["warnings"] if w["code"] == "edited"]
-    assert "1 stride left out" in message
+    assert "1 stride excluded" in message
     assert any(r["excluded_reason"] == "manual:stumbled" for r in final["strides"])
     counts = [
         next(int(r["n"]) for r in table if r["name"] == "stride_time_s" and r["side"] == "left")

@@ -105,7 +105,7 @@ async def test_both_legs_against_themselves_and_against_a_reference(
         assert "RMS error with nominal values" in page
         assert "optical.parquet" in page
         page = (await client.get(f"/sessions/{session}/sensitivity?run={job['id']}")).text
-        assert "A sensor turned by 2° matters most" in page
+        assert "Sensor misalignment matters most" in page
         assert "RMS error with nominal" not in page
     async with clinic.client("assistant") as client:
         assert (await client.post(path, json={})).status_code == 403

@@ -64,14 +64,14 @@ async def test_takes_of_a_day_walked_alike_are_one_visit_with_their_mean(clinic:
     )
     html = await text_of(clinic, f"/patients/{patient}")
     rows = rows_of(html)
-    whole = next(r for r in rows if "2 takes" in r)
+    whole = next(r for r in rows if "2 trials" in r)
     assert "0.95" in whole
     assert "+0.35 changed" in whole, "the mean of the takes against the visit before"
-    assert [r for r in rows if re.search(r"take 1\b.*0\.90", r)]
-    assert [r for r in rows if re.search(r"take 2\b.*1\.00", r)]
+    assert [r for r in rows if re.search(r"trial 1\b.*0\.90", r)]
+    assert [r for r in rows if re.search(r"trial 2\b.*1\.00", r)]
     assert "first in this condition" in next(r for r in rows if "Walk at 1.4" in r)
     assert "first in this condition" in next(r for r in rows if "Walk at 0.6" in r)
-    assert 'aria-label="Takes 0.90, 1.00, mean 0.95 m/s"' in html
+    assert 'aria-label="Trials 0.90, 1.00, mean 0.95 m/s"' in html
     assert html.count('name="visit"') == 4, "every take can be compared"
     page = await text_of(clinic, f"/sessions/{fast}")
     assert "No earlier visit in this condition" in page
