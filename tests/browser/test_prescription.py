@@ -35,7 +35,9 @@ def test_a_prescription_is_written_changed_and_ended(opened: Opener, walker: str
     # one choice says it all; the rest waits behind "More"
     summary = page.locator("[data-summary]")
     expect(summary).to_have_text(
-        re.compile(r"Step length, (left|right); target 0\.\d+ ± 0\.\d+\s?m \(person's better side\); shown as")
+        re.compile(
+            r"Step length, (left|right); target 0\.\d+ ± 0\.\d+\s?m \(person's better side\); shown as"
+        )
     )
     worse = "left" if "Step length, left" in summary.inner_text() else "right"
     expect(page.get_by_label("Probe after")).to_be_hidden()

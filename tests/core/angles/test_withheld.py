@@ -158,7 +158,9 @@ def test_distances_of_a_chain_that_does_not_hang_together_are_withheld_in_files_
     assert {(p.mean, p.reason) for p in distances} == {(None, "estimator_bad")}
     messages = [n.message for n in exchange.notices if n.code == "distances_withheld"]
     assert len(messages) == 1
-    assert messages[0].startswith("Distances of both feet are not reported: the path does not fit the sensors.")
+    assert messages[0].startswith(
+        "Distances of both feet are not reported: the path does not fit the sensors."
+    )
     files = analysis_files(exchange)
     bundle = load_bundle(files)
     second_gait = measure_gait(read_tracks(files["tracks.parquet"], bundle.events, bundle.angles))
