@@ -54,6 +54,8 @@ class _Upload:
     notices: list[Notice] = field(default_factory=list)
     sha256: dict[str, str] = field(default_factory=dict)
     guessed: bool = False
+    guesses: list[tuple[SourceFile, bytes, list[Draft], Notice]] = field(default_factory=list)
+    """Tables without a description: file, content, drafts, notice. Used if nothing else is a recording."""
     sidecars: set[str] = field(default_factory=set)
     """Files that say how another one is read."""
 
@@ -86,12 +88,27 @@ def read_recording(
     sensors = sum(count for _, count in sizes)
     for (member, spec), (rows, _) in zip(sources, sizes, strict=True):
         _take(member, spec, upload, long=is_too_long(rows, sensors))
+    _use_guesses(upload)
     if not upload.drafts and not upload.stored and not upload.long:
         raise _nothing_readable(upload)
     recording = (
         _stored(upload) if upload.stored else Recording(finish(upload.drafts), segments={}, long=upload.long)
     )
     return _declared(recording, manifest, upload)
+
+
+def _use_guesses(upload: _Upload) -> None:
+    """Use the tables read without a description, unless other files are the recording."""
+    if upload.drafts or upload.stored or upload.long:
+        for member, data, _, _ in upload.guesses:
+            error = FormatError("manifest_needed", _needs_manifest(member.name, data))
+            upload.problems.append((member.name, error))
+            del upload.sha256[member.name]
+        return
+    for _, _, drafts, notice in upload.guesses:
+        upload.drafts += drafts
+        upload.notices.append(notice)
+        upload.guessed = True
 
 
 def _find_manifest(
@@ -183,10 +200,10 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
         elif kind == "empty":
             raise FormatError("empty", f"{member.name} is empty; copy or export it again.")
         elif kind == "table" and (entry := table_guess.guess_entry(member)) is not None:
-            upload.drafts += table.read_table(data, member.name, read_source(JsonNode(entry, "sources")))
-            upload.guessed = True
+            drafts = table.read_table(data, member.name, read_source(JsonNode(entry, "sources")))
             message = f"{member.name} was read without a manifest: {table_guess.describe_entry(entry)}."
-            upload.notices.append(Notice("table_guessed", message, severity="info"))
+            notice = Notice("table_guessed", message, severity="info")
+            upload.guesses.append((member, data, drafts, notice))
         elif kind == "table":
             raise FormatError("manifest_needed", _needs_manifest(member.name, data))
         elif kind == "known":

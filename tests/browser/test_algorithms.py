@@ -35,10 +35,10 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
 
     for engine in page.locator("[data-engine]").all():
         engine.check()
-    expect(page.get_by_text("39 of 39 chosen")).to_be_visible()
+    expect(page.get_by_text("39 of 39 selected")).to_be_visible()
     for engine in page.locator("[data-engine]").all():
         engine.uncheck()
-    expect(page.get_by_text("0 of 39 chosen")).to_be_visible()
+    expect(page.get_by_text("0 of 39 selected")).to_be_visible()
     page.get_by_role("button", name="Run on this trial").click()
     expect(page.locator("filter-choice .form-error")).to_be_visible()
     page.get_by_label("Mahony2008").check()

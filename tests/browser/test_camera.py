@@ -33,7 +33,7 @@ def filming(launch: Launcher) -> Iterator[Browser]:
 
 
 def agree(page: Page) -> None:
-    page.get_by_label(re.compile("the person agreed to be filmed")).check()
+    page.get_by_label(re.compile("the person has agreed to be filmed")).check()
 
 
 def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
@@ -136,7 +136,7 @@ def test_a_refused_camera_is_said_and_disturbs_nothing(
     browser = launch([*FLAT, *FAKE, "--deny-permission-prompts"])
     with tablet(browser, running) as page:
         pair(page, clinic.code)
-        page.get_by_label(re.compile("the person agreed to be filmed")).click()
+        page.get_by_label(re.compile("the person has agreed to be filmed")).click()
         card = page.locator("[data-camera]")
         expect(card.get_by_text("Camera access was denied")).to_be_visible()
         expect(card.get_by_role("checkbox")).not_to_be_checked()

@@ -65,7 +65,7 @@ def test_a_walk_played_on_the_tablet_is_the_recording_though_network_and_page_we
     with tablet(flat, network) as page:
         pair(page, clinic.code)
         choose(page, walk_files())
-        expect(page.locator("[data-sum]")).to_contain_text("2 copies left out")
+        expect(page.locator("[data-sum]")).to_contain_text("2 copies excluded")
         place(page, SEGMENTS)
         expect(page.locator("[data-go]")).to_have_text("Start with 7 sensors")
         began = time.monotonic()

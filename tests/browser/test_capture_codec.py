@@ -397,4 +397,4 @@ def test_the_self_test_refuses_what_gravity_contradicts(blank: Page, spoil: Any,
 def test_the_self_test_refuses_the_wrong_edge(blank: Page) -> None:
     result = run(blank, "capture/sources/axes.js", SELF_TEST, turned_device("xyz", 1, edge=-1.0))
     assert result["result"] is None
-    assert "wrong way round" in result["problem"]
+    assert "was reversed" in result["problem"]

@@ -24,7 +24,7 @@ def test_a_wrong_password_is_said_and_the_right_one_leads_on(opened: Opener, fil
     page.get_by_label("User name").fill("anna")
     page.get_by_label("Password").fill("not the password")
     page.get_by_role("button", name="Sign in").click()
-    expect(page.get_by_role("alert")).to_contain_text("wrong")
+    expect(page.get_by_role("alert")).to_contain_text("Incorrect name or password")
     page.get_by_label("Password").fill(PASSWORD)
     page.get_by_role("button", name="Sign in").click()
     page.wait_for_url(re.compile(rf":\d+/patients/{filled.patient}$"))
@@ -203,7 +203,7 @@ def test_a_form_is_kept_when_the_sign_in_ends_and_its_end_is_told_before(
     page.route("**/api/v1/sign-in", lambda r: r.fulfill(json={"name": NAME, "left_s": 100}), times=1)
     page.evaluate("() => import('/static/js/sign-out.js')")
     expect(soon).to_be_visible()
-    expect(soon).to_contain_text(re.compile(r"covered in 1:\d\d"))
+    expect(soon).to_contain_text(re.compile(r"hidden in 1:\d\d"))
     with page.expect_response("**/api/v1/sign-in"):  # else it would find the end below
         soon.get_by_role("button", name="Stay signed in").click()
     expect(soon).to_be_hidden()

@@ -68,7 +68,7 @@ def test_trends_and_paper_of_daily_life_obey_the_design_system(
     opened: Opener, lived: tuple[str, str]
 ) -> None:
     page = opened(f"/patients/{lived[0]}/trends", stays=True)
-    expect(page.get_by_role("region", name="Capacity and performance")).to_contain_text("not known")
+    expect(page.get_by_role("region", name="Capacity and performance")).to_contain_text("unknown")
     faults = all_faults(page)
     page.goto(f"/sessions/{lived[1]}/print")
     faults += all_faults(page)

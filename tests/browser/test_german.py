@@ -87,7 +87,7 @@ def test_scripts_speak_german_and_write_decimal_commas(opened: Opener) -> None:
     evaluation = page.evaluate(
         """async () => {
           const { fixed, speak, translate } = await import("/static/js/common/words.js");
-          const rest = speak`${fixed(1.25, 2)} s are still on this tablet only.`;
+          const rest = speak`${fixed(1.25, 2)} s are only on this tablet.`;
           return [rest, translate("Stand still."), speak`Stop`];
         }"""
     )

@@ -136,7 +136,7 @@ def test_the_current_stride_grows_without_a_norm_of_another_zero_and_follows_the
     page.get_by_role("button", name="Hip").click()
     page.wait_for_timeout(150)
     assert page.evaluate(drawing) != initial_evaluation
-    expect(page.locator("[data-variable]")).to_have_text("Hip flexion, from standing")
+    expect(page.locator("[data-variable]")).to_have_text("Hip flexion, relative to standing")
 
 
 def test_charts_follow_the_theme(told: Opener, trained: tuple[str, str, str]) -> None:

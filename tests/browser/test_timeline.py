@@ -327,7 +327,7 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     expect(row).to_contain_text("no: looked at the dog")
     # kept by its middle, named by its contact as in the list
     contact = row.locator("td.n").first.inner_text()
-    expect(timeline.locator("[data-edits] li").first).to_contain_text(f"stride at {contact} s left out")
+    expect(timeline.locator("[data-edits] li").first).to_contain_text(f"stride at {contact} s excluded")
     overview = opened(f"/sessions/{walked}")
     expect(overview.locator("#warnings")).to_contain_text("1 stride left out")
     timeline.locator("[data-count]").click()

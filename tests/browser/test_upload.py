@@ -108,7 +108,7 @@ def test_why_nothing_can_be_analysed_is_said_on_a_tablet(opened: Opener, running
     for select in page.locator("tr[data-device] select").all():
         select.select_option("")
     expect(page.locator("[data-analyse]")).to_be_disabled()
-    expect(page.get_by_text("0 of 7 sensors placed")).to_be_visible()
+    expect(page.get_by_text("0 of 7 sensors assigned")).to_be_visible()
 
 
 def test_a_table_with_its_manifest_is_analysed_as_from_the_command_line(

@@ -42,7 +42,7 @@ def test_a_film_is_aligned_by_one_contact_and_follows_the_clock(
     payload: FilePayload = {"name": "walk.webm", "mimeType": "video/webm", "buffer": film}
     page.locator("video-upload [data-file]").set_input_files(payload)
     expect(page.get_by_text("Not aligned yet")).to_be_visible()
-    expect(page.get_by_text(re.compile("anna said on .* agreed"))).to_be_visible()
+    expect(page.get_by_text(re.compile("Consent to filming recorded by anna on"))).to_be_visible()
     page.goto(f"/sessions/{filled.done}")
     player = page.locator("take-video")
     page.wait_for_function("() => Number(document.querySelector('take-video')?.dataset.length) > 1.5")

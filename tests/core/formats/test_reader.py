@@ -180,3 +180,17 @@ def test_a_take_is_too_long_by_what_its_analysis_needs() -> None:
     assert is_too_long(7.0 * hour, 7)
     assert not is_too_long(5.5 * hour, 1)
     assert is_too_long(8.0 * hour, 1)
+
+
+def test_a_table_without_a_description_is_a_recording_only_if_nothing_else_is() -> None:
+    rows = [
+        f"{k / 100:.2f},{0.1 * np.sin(k / 9):.4f},0.2,9.8,{np.cos(k / 9):.4f},1.0,{k % 7}" for k in range(800)
+    ]
+    table = "\n".join(["time_s,acc_x,acc_y,acc_z,gyr_x,gyr_y,gyr_z", *rows])
+    alone = read_recording([source("foot_l.csv", table)])
+    assert len(alone.streams) == 1
+    assert "table_guessed" in {n.code for n in alone.notices}
+    beside = read_recording([mt_file(), source("foot_l.csv", table)])
+    assert set(beside.streams) == {"00B40B91"}
+    assert "table_guessed" not in {n.code for n in beside.notices}
+    assert "foot_l.csv" not in beside.sha256
