@@ -329,7 +329,7 @@ def test_a_second_click_leaves_a_stride_out_with_its_reason_and_the_overview_fol
     contact = row.locator("td.n").first.inner_text()
     expect(timeline.locator("[data-edits] li").first).to_contain_text(f"stride at {contact} s excluded")
     overview = opened(f"/sessions/{walked}")
-    expect(overview.locator("#warnings")).to_contain_text("1 stride left out")
+    expect(overview.locator("#warnings")).to_contain_text("1 stride excluded")
     timeline.locator("[data-count]").click()
     done(timeline, "included")
     # the stride is picked: a second click, on why, leaves it out
