@@ -37,7 +37,7 @@ def test_takes_stand_at_their_days_and_the_newest_is_large_and_named() -> None:
     assert dots(root) == [("6%", "ps-b"), ("50%", "ps-b"), ("94%", "pl-b")]
     assert texts(root, "strong halo") == ["3.0"]
     assert sorted(texts(root, "words")) == ["1 Mar", "11 Mar", "6 Mar"]
-    assert "".join(root.itertext()).startswith("Noise over the trials")
+    assert "".join(root.itertext()).startswith("Noise by trial")
 
 
 def test_a_take_that_did_not_measure_it_is_left_out() -> None:
