@@ -48,7 +48,7 @@ def test_filters_are_chosen_run_and_compared_with_a_reference(
     page.get_by_label("Compare with a reference").select_option("optical.csv")
     page.get_by_role("button", name="Run on this trial").click()
     expect(page.get_by_role("heading", name="Summary")).to_be_visible(timeout=90_000)
-    expect(page.get_by_text(re.compile("Martin2010 needs a magnetometer"))).to_be_visible()
+    expect(page.get_by_text(re.compile("Martin2010 requires a magnetometer"))).to_be_visible()
     expect(page.get_by_role("heading", name="Against the reference")).to_be_visible()
     expect(page.locator("circle.ba").first).to_be_attached()
     page.wait_for_load_state()  # its script sends the choice

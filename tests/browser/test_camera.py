@@ -42,7 +42,7 @@ def test_a_take_is_filmed_though_the_line_breaks_and_plays_beside_the_figure(
     with tablet(filming, network) as page:
         pair(page, clinic.code)
         card = page.locator("[data-camera]")
-        expect(card.get_by_text("Without sound, at most 500")).to_be_visible()
+        expect(card.get_by_text("Without sound, up to 500")).to_be_visible()
         expect(card.locator("video")).to_be_hidden()  # nobody is seen before somebody agreed
         agree(page)
         expect(card.locator("video")).to_be_visible()
