@@ -31,6 +31,7 @@ from sagittal.web.stored_sentences import SentenceFinder
 SOURCE: Final = "en"
 
 TEXTS: Final = Path(__file__).parent / "texts"
+EARLIER: Final = TEXTS / "earlier.json"
 
 
 def name_language(code: str) -> str:
@@ -137,7 +138,7 @@ def read_messages(path: Path) -> Iterator[tuple[str, str, frozenset[str]]]:
 @functools.cache
 def read_earlier() -> Mapping[str, str]:
     """Earlier wording of messages → current wording; results of earlier versions hold finished sentences."""
-    wordings: dict[str, str] = json.loads((TEXTS / "earlier.json").read_text("utf-8"))
+    wordings: dict[str, str] = json.loads(EARLIER.read_text("utf-8"))
     return wordings
 
 

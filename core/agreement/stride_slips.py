@@ -24,6 +24,7 @@ from sagittal.core.agreement.stride_gravity import (
 )
 from sagittal.core.errors import Notice
 from sagittal.core.frames import Floats, Segment
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.recording import UniformRecording
 from sagittal.core.signals.rest import Window
@@ -249,7 +250,11 @@ def _scatter(u: Floats, middle: Floats) -> float:
 def _tell_creep(segment: Segment, turn: float) -> Notice:
     return Notice(
         CREEPS,
-        f"The sensor on {segment} slipped slowly, by {np.degrees(turn):.0f}° over the walk. Levels of its "
-        "angles are unreliable. Fasten the sensor and record again.",
+        Message(
+            "The sensor on {segment} slipped slowly, by {turn:.0f}° over the walk. Levels of its angles are "
+            "unreliable. Fasten the sensor and record again.",
+            segment=segment,
+            turn=np.degrees(turn),
+        ),
         segment,
     )

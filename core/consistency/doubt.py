@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from sagittal.core.errors import Notice
@@ -34,9 +35,9 @@ class Doubt:
 
     def to_json(self) -> dict[str, object]:
         """Plain values, as `read_doubt` takes them."""
-        return asdict(self)
+        return {"notice": self.notice.to_json(), "scope": self.scope}
 
 
-def read_doubt(values: dict[str, Any]) -> Doubt:
-    """A doubt from its plain values."""
-    return Doubt(Notice(**values["notice"]), values["scope"])
+def read_doubt(values: Mapping[str, Any]) -> Doubt:
+    """Read what `Doubt.to_json` wrote."""
+    return Doubt(Notice.from_json(values["notice"]), values["scope"])

@@ -18,6 +18,7 @@ from sagittal.core.consistency.doubt import LATE_FOOT, Doubt
 from sagittal.core.errors import Notice
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.frames import FOOT, SIDES, Floats, Side
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.recording import SensorSignals
 
@@ -83,10 +84,15 @@ def judge_echo(pelvis: SensorSignals, events: GaitEvents, rate_hz: float) -> Dou
     return Doubt(
         Notice(
             LATE_FOOT,
-            f"Contacts of the {'right' if echo.lag_s > 0 else 'left'} foot shake the lower back "
-            f"{1000 * abs(echo.lag_s):.0f} ± {2000 * echo.sd_s:.0f} ms before they are timed: the clock "
-            "of that foot is late. Parameters between the feet are suppressed. Synchronise the sensors and "
-            "record again.",
+            Message(
+                "Contacts of the {side} foot shake the lower back {ms:.0f} ± {sd:.0f} ms before they "
+                "are timed: "
+                "the clock of that foot is late. Parameters that combine both feet are not reported. "
+                "Synchronise the sensors and record again.",
+                side=late,
+                ms=1000 * abs(echo.lag_s),
+                sd=2000 * echo.sd_s,
+            ),
             FOOT[late],
         ),
         "between_feet",

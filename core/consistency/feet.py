@@ -18,6 +18,7 @@ from sagittal.core.errors import Notice
 from sagittal.core.events.bouts import Bout
 from sagittal.core.events.result import GaitEvents, Strides
 from sagittal.core.frames import FOOT, SIDES, Bools, Floats, Side
+from sagittal.core.message import Message
 
 COUNT_SHARE: Final = 0.10
 LEAST_CONTACTS: Final = 8
@@ -75,7 +76,7 @@ def _find_stride_time(strides: Strides, side: Side) -> float | None:
     return float(np.median(used)) if len(used) >= LEAST_STRIDES else None
 
 
-_WITHHELD: Final = (
+_REMEDY: Final = (
     "Parameters that combine both feet are not reported. Correct the contacts in the timeline, or check "
     "the sensors on both feet and their clocks."
 )
@@ -85,8 +86,13 @@ def _tell_counts(counts: dict[Side, int]) -> Notice:
     fewer: Side = "left" if counts["left"] < counts["right"] else "right"
     return Notice(
         CONTRADICTED,
-        f"Contacts while walking: left foot {counts['left']}, right foot {counts['right']}. Both feet "
-        f"take the same number of strides, so contacts were missed or detected twice. {_WITHHELD}",
+        Message(
+            "Contacts while walking: left foot {left}, right foot {right}. Both feet take the same number of "
+            "strides, so contacts were missed or detected twice. {remedy}",
+            left=counts["left"],
+            right=counts["right"],
+            remedy=_REMEDY,
+        ),
         FOOT[fewer],
     )
 
@@ -94,6 +100,11 @@ def _tell_counts(counts: dict[Side, int]) -> Notice:
 def _tell_times(left: float, right: float) -> Notice:
     return Notice(
         CONTRADICTED,
-        f"Stride time is {left:.2f} s on the left and {right:.2f} s on the right. It must be equal on "
-        f"average, so the contacts or the clock of one foot are wrong. {_WITHHELD}",
+        Message(
+            "Stride time is {left:.2f} s on the left and {right:.2f} s on the right. It must be equal on "
+            "average, so the contacts or the clock of one foot are wrong. {remedy}",
+            left=left,
+            right=right,
+            remedy=_REMEDY,
+        ),
     )

@@ -21,6 +21,7 @@ from sagittal.core.agreement.terms import find_bias
 from sagittal.core.consistency.doubt import RATE, Doubt
 from sagittal.core.errors import Notice
 from sagittal.core.frames import FOOT, GRAVITY
+from sagittal.core.message import Message
 from sagittal.core.rotation import exp, find_lengths, multiply, rotate
 from sagittal.core.signals.recording import SensorSignals, UniformRecording
 from sagittal.core.signals.rest import measure_quietness
@@ -107,11 +108,16 @@ def judge_rate(recording: UniformRecording, *, treadmill: bool) -> Doubt | None:
     return Doubt(
         Notice(
             RATE,
-            "Gravity over the strides of both feet fits a sampling rate of "
-            f"{recording.rate_hz / factor:.1f} Hz, not {recording.rate_hz:.1f} Hz "
-            f"({100 * (1 / factor - 1):+.1f} ± {200 * sd:.1f} %). Times, lengths and speeds would be wrong "
-            "by as much and more. Check the rate that was declared; a wrong scale of the gyroscopes looks "
-            "alike.",
+            Message(
+                "Gravity over the strides of both feet indicates a sampling rate of {rate:.1f} Hz, not "
+                "{declared:.1f} Hz ({change:+.1f} ± {sd:.1f} %). Times, lengths and speeds may be "
+                "wrong by at "
+                "least as much. Check the declared rate; a wrong gyroscope scale has the same effect.",
+                rate=recording.rate_hz / factor,
+                declared=recording.rate_hz,
+                change=100 * (1 / factor - 1),
+                sd=200 * sd,
+            ),
         ),
         "none",
     )

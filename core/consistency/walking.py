@@ -14,8 +14,10 @@ import numpy as np
 from sagittal.core.consistency.doubt import NOT_WALKING, Doubt
 from sagittal.core.errors import Notice
 from sagittal.core.events.bouts import Bout
+from sagittal.core.events.choice import measure_distance
 from sagittal.core.events.result import GaitEvents
 from sagittal.core.frames import SIDES, Floats
+from sagittal.core.message import Message
 from sagittal.core.rotation import find_lengths
 from sagittal.core.signals.filtering import low_pass
 from sagittal.core.signals.recording import SensorSignals
@@ -44,12 +46,7 @@ def measure_coincidence(events: GaitEvents) -> float | None:
         walked = strides[strides < LONGEST_S]
         if not len(walked):
             return None
-        next_index = np.searchsorted(opposite, own)
-        nearest = np.minimum(
-            np.abs(opposite[np.minimum(next_index, len(opposite) - 1)] - own),
-            np.abs(opposite[np.maximum(next_index - 1, 0)] - own),
-        )
-        shares.append(float(np.mean(nearest < TOGETHER * np.median(walked))))
+        shares.append(float(np.mean(measure_distance(own, opposite) < TOGETHER * np.median(walked))))
     return min(shares)
 
 
@@ -61,8 +58,11 @@ def judge_alternation(events: GaitEvents) -> Doubt | None:
     return Doubt(
         Notice(
             NOT_WALKING,
-            f"Both feet land together at {100 * together:.0f} % of their contacts. This is not walking, so "
-            "gait parameters are suppressed. Check that the sensors were worn.",
+            Message(
+                "Both feet land together at {together:.0f} % of their contacts. This is not walking, so gait "
+                "parameters are not reported. Check that the sensors were worn.",
+                together=100 * together,
+            ),
         ),
         "all",
     )
@@ -99,9 +99,14 @@ def judge_tilting(
     return Doubt(
         Notice(
             NOT_WALKING,
-            f"The sensor on {segment} tilts at {np.degrees(tilting):.0f} °/s (median; walking: below "
-            f"{np.degrees(TILTING):.0f}). This is not walking, so gait parameters are suppressed. Check "
-            "that the sensor was worn.",
+            Message(
+                "The sensor on {segment} tilts at {tilting:.0f} °/s (median; walking: below "
+                "{limit:.0f}). This "
+                "is not walking, so gait parameters are not reported. Check that the sensor was worn.",
+                segment=segment,
+                tilting=np.degrees(tilting),
+                limit=np.degrees(TILTING),
+            ),
             segment,
         ),
         "all",

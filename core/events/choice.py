@@ -16,31 +16,36 @@ import numpy as np
 from sagittal.core.frames import Floats
 
 SAME_S: Final = 0.1
-"""Contacts so close are one. Both finders differ by 0.03 s on ipol_walks (standard deviation)."""
+"""Contacts closer than this are one. The detectors differ by 0.03 s (standard deviation) on ipol_walks."""
 SEEN_SHARE: Final = 0.5
 """The pitch is used if at least this share of the contacts by way has one by pitch: 0.85 and more for all
 feet of ipol_walks and stroke_treadmill and of virtual people it reads correctly, 0.67 for one foot of
 neura_walk (contacts by way up to 0.13 s late), at most 0.33 for virtual feet that it misreads."""
 COUNT_SHARE: Final = 0.8
-"""The way is not believed where contacts by pitch outside its swings make it fewer than this share of all:
-who never rests between two steps hides them from it. One inside a swing is none: the foot is on its way."""
+""
+"""Displacement is rejected if its swings are fewer than this share of all contacts, those by pitch outside
+swings included: a foot that never rests between two steps hides them. A contact within a swing is not one."""
 LEAST: Final = 3
-"""So many swings in a row are a gait."""
+"""Minimum number of swings."""
+
+
+def measure_distance(times: Sequence[float] | Floats, others: Sequence[float] | Floats) -> Floats:
+    """Distance (n,) of each of n times to the nearest of other times, s; infinite if there are none."""
+    own, other = np.asarray(times, np.float64), np.sort(np.asarray(others, np.float64))
+    if not len(other):
+        return np.full(len(own), np.inf)
+    next_index = np.clip(np.searchsorted(other, own), 0, len(other) - 1)
+    previous_index = np.maximum(next_index - 1, 0)
+    return np.asarray(np.minimum(np.abs(other[next_index] - own), np.abs(other[previous_index] - own)))
 
 
 def count_seen(by_way: Sequence[float] | Floats, by_pitch: Sequence[float] | Floats) -> int:
     """Number of contacts by displacement, s, with a contact by pitch close in time."""
-    way, pitch = np.asarray(by_way, np.float64), np.sort(np.asarray(by_pitch, np.float64))
-    if not len(way) or not len(pitch):
-        return 0
-    next_index = np.clip(np.searchsorted(pitch, way), 0, len(pitch) - 1)
-    previous_index = np.maximum(next_index - 1, 0)
-    apart = np.minimum(np.abs(pitch[next_index] - way), np.abs(pitch[previous_index] - way))
-    return int((apart <= SAME_S).sum())
+    return int((measure_distance(by_way, by_pitch) <= SAME_S).sum())
 
 
 def believes_way(by_way: Sequence[tuple[float, float]], by_pitch: Sequence[float] | Floats) -> bool:
-    """Whether the contacts of a foot are those by its way.
+    """Whether displacement determines the contacts of a foot.
 
     Parameters
     ----------

@@ -93,10 +93,6 @@ WINDOWS: Final = {
 """Name in the kernel → parameter that it takes in samples, at least one."""
 
 
-_SHORTEST: Final = 24
-"""Place of the shortest movement in the rule."""
-
-
 @dataclass(eq=False)
 class FootWayState:
     """State of one foot between two blocks.
@@ -106,7 +102,7 @@ class FootWayState:
     rule : the parameters in the order of the kernel's. turns (m, 4), track (m, 3), acc (m, 3),
         course (m, 2) : orientations, derived quantities, forces and velocities of the last seconds.
     counters, sums : indices named in way_kernel.py. counts : histogram of the angular rates so far.
-    learns : whether the rest level is still being learned.
+    shortest : samples of the shortest movement. learns : whether the rest level is still being learned.
     """
 
     rule: Floats
@@ -117,6 +113,7 @@ class FootWayState:
     counters: NDArray[np.int64]
     sums: Floats
     counts: Floats
+    shortest: int
     learns: bool = True
 
     @classmethod
@@ -157,6 +154,7 @@ class FootWayState:
             counters=counters,
             sums=sums,
             counts=np.zeros(BINS),
+            shortest=samples["shortest"],
         )
 
     def learn(self, q: Floats, valid: Bools) -> None:
@@ -181,7 +179,7 @@ def advance_foot_ways(state: FootWayState, q: Floats, valid: Bools, acc: Floats)
     q : (n, 4) foot to W. valid : (n,) False where the sensor was lost. acc : (n, 3) specific force, foot
         axes, m/s².
     """
-    room = 2 * (len(q) // max(1, int(state.rule[_SHORTEST])) + 3)
+    room = 2 * (len(q) // state.shortest + 3)
     found_int, found_float = np.empty((room, 4), np.int64), np.empty((room, 2))
     # copies: the kernel is compiled once, for writable contiguous arrays of these types
     m = _load_kernel()(

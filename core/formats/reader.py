@@ -16,18 +16,16 @@ from sagittal.core.formats.common_time import finish
 from sagittal.core.formats.draft import Draft
 from sagittal.core.formats.json_tree import JsonNode
 from sagittal.core.formats.manifest import Manifest, parse_manifest
+from sagittal.core.formats.refusals import explain_manifest, explain_unreadable
 from sagittal.core.formats.source import SourceFile, digest_file, sha256
 from sagittal.core.formats.source_spec import SourceSpec, read_source
 from sagittal.core.formats.vendors import cwa, mapping_xml
 from sagittal.core.formats.vendors.device_motion import SIGN_ASSUMED
-from sagittal.core.formats.vendors.registry import find_vendor, list_formats
+from sagittal.core.formats.vendors.registry import find_vendor
 from sagittal.core.frames import Segment
-from sagittal.core.plurals import plural
 from sagittal.core.signals.correction import AS_READ, SensorCorrection
 from sagittal.core.signals.recording import ImuStream, Recording
 from sagittal.core.signals.sample_blocks import LongStream
-
-_SHOWN = 5
 
 ROW_BYTES: Final = 300.0
 SENSOR_BYTES: Final = 250.0
@@ -54,8 +52,8 @@ class _Upload:
     notices: list[Notice] = field(default_factory=list)
     sha256: dict[str, str] = field(default_factory=dict)
     guessed: bool = False
-    guesses: list[tuple[SourceFile, bytes, list[Draft], Notice]] = field(default_factory=list)
-    """Tables without a description: file, content, drafts, notice. Used if nothing else is a recording."""
+    undescribed: list[tuple[SourceFile, bytes]] = field(default_factory=list)
+    """Tables that say by themselves how they are read, with their content."""
     sidecars: set[str] = field(default_factory=set)
     """Files that say how another one is read."""
 
@@ -88,27 +86,31 @@ def read_recording(
     sensors = sum(count for _, count in sizes)
     for (member, spec), (rows, _) in zip(sources, sizes, strict=True):
         _take(member, spec, upload, long=is_too_long(rows, sensors))
-    _use_guesses(upload)
+    _read_undescribed(upload)
     if not upload.drafts and not upload.stored and not upload.long:
-        raise _nothing_readable(upload)
+        raise explain_unreadable(upload.problems, upload.notices)
     recording = (
         _stored(upload) if upload.stored else Recording(finish(upload.drafts), segments={}, long=upload.long)
     )
     return _declared(recording, manifest, upload)
 
 
-def _use_guesses(upload: _Upload) -> None:
-    """Use the tables read without a description, unless other files are the recording."""
-    if upload.drafts or upload.stored or upload.long:
-        for member, data, _, _ in upload.guesses:
-            error = FormatError("manifest_needed", _needs_manifest(member.name, data))
-            upload.problems.append((member.name, error))
-            del upload.sha256[member.name]
-        return
-    for _, _, drafts, notice in upload.guesses:
-        upload.drafts += drafts
-        upload.notices.append(notice)
+def _read_undescribed(upload: _Upload) -> None:
+    """Read tables without a description, unless other files are the recording."""
+    others = bool(upload.drafts or upload.stored or upload.long)
+    for member, data in upload.undescribed:
+        entry = None if others else table_guess.guess_entry(member)
+        try:
+            if entry is None:
+                raise FormatError("manifest_needed", explain_manifest(member.name, data))
+            upload.drafts += table.read_table(data, member.name, read_source(JsonNode(entry, "sources")))
+        except FormatError as e:
+            upload.problems.append((member.name, e))
+            continue
         upload.guessed = True
+        message = f"{member.name} was read without a manifest: {table_guess.describe_entry(entry)}."
+        upload.notices.append(Notice("table_guessed", message, severity="info"))
+        upload.sha256[member.name] = sha256(member.read())
 
 
 def _find_manifest(
@@ -199,13 +201,9 @@ def _take(member: SourceFile, spec: SourceSpec | None, upload: _Upload, *, long:
             upload.drafts += table.read_table(data, member.name, spec)
         elif kind == "empty":
             raise FormatError("empty", f"{member.name} is empty; copy or export it again.")
-        elif kind == "table" and (entry := table_guess.guess_entry(member)) is not None:
-            drafts = table.read_table(data, member.name, read_source(JsonNode(entry, "sources")))
-            message = f"{member.name} was read without a manifest: {table_guess.describe_entry(entry)}."
-            notice = Notice("table_guessed", message, severity="info")
-            upload.guesses.append((member, data, drafts, notice))
         elif kind == "table":
-            raise FormatError("manifest_needed", _needs_manifest(member.name, data))
+            upload.undescribed.append((member, data))
+            return
         elif kind == "known":
             raise FormatError(
                 "unsupported_format", f"{member.name} is {format_name}; {_sniff.advise(format_name)}"
@@ -266,40 +264,6 @@ def is_too_long(rows: float, sensors: int) -> bool:
     if sensors == 1:
         return rows > MOST_ROWS_ALONE
     return rows * (ROW_BYTES + SENSOR_BYTES * sensors) > MOST_BYTES
-
-
-def _needs_manifest(name: str, data: bytes) -> str:
-    lines = text.head_lines(data, 2)
-    start = lines[0][:80].decode("utf-8", errors="replace")
-    return (
-        f"{name} is a table that starts with '{start}'; say in a manifest which columns are which sensor "
-        "and their units (docs/reference/formats.md)."
-    )
-
-
-def _nothing_readable(upload: _Upload) -> FormatError:
-    alike: dict[tuple[str, str], list[InputError]] = {}
-    for name, e in upload.problems:
-        alike.setdefault((e.code, e.message.replace(name, "")), []).append(e)
-    if len(alike) == 1:
-        (errors,) = alike.values()
-        first = errors[0]
-        return FormatError(first.code, _tell_alike(errors), sensor=first.sensor, t_s=first.t_s)
-    codes = {code for code, _ in alike}
-    lines = [_tell_alike(errors) for errors in alike.values()] + [n.message for n in upload.notices]
-    summary = " ".join(lines[:_SHOWN]) + (
-        f" … and {len(lines) - _SHOWN} more." if len(lines) > _SHOWN else ""
-    )
-    code = codes.pop() if len(codes) == 1 and not upload.notices else "unknown_format"
-    return FormatError(code, f"No sensor recording was found; tried {list_formats()}. {summary}")
-
-
-def _tell_alike(errors: Sequence[InputError]) -> str:
-    """Error message for one of several files with the same fault, with the number of the others."""
-    count = len(errors) - 1
-    if not count:
-        return errors[0].message
-    return f"{errors[0].message} The same holds of {count} other {plural(count, 'file', 'files')}."
 
 
 def _stored(upload: _Upload) -> Recording:

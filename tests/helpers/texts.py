@@ -373,8 +373,10 @@ def update(language: str) -> tuple[int, int]:
     """
     path = catalogue_path(language)
     with path.open("rb") as file:
-        initial = {str(entry.id): str(entry.string) for entry in read_po(file) if entry.id}
-    catalog = Catalog(locale=language, project="Sagittal", fuzzy=False)
+        earlier = read_po(file)
+    initial = {str(entry.id): str(entry.string) for entry in earlier if entry.id}
+    # the date stays: without a new message the file is the same to the byte
+    catalog = Catalog(locale=language, project="Sagittal", fuzzy=False, creation_date=earlier.creation_date)
     catalog.header_comment = f"# {LANGUAGES[language]} texts of Sagittal (docs/how-to/languages.md)."
     messages = list_messages()
     for message, files in messages.items():

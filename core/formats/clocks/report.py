@@ -145,7 +145,7 @@ def describe_blind(rows: int, first: int, wrap: float) -> Repair:
         f"The counter starts again after {wrap:.0f} samples, so "
         f"{plural(rows, 'a loss', 'each of the losses')} (first: row {first + 1}) may be {wrap:.0f} "
         "samples longer, or a multiple of it. Strides next to "
-        f"{plural(rows, 'it', 'them')} are left out.",
+        f"{plural(rows, 'it', 'them')} may be wrong.",
         "warning",
     )
 
